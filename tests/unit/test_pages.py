@@ -15,9 +15,8 @@ from places import CONFIG, ROOT, tracked
 from study.artifact.paths import RESULTS
 from study.figures.stability_map import LOOKS
 from study.pipeline.study import StudySettings
-from study.tables import declared
 from study.tables.kit.results import trained
-from study.verification.references import folder_of, read_reference
+from study.verification.references import folder_of, read_references
 from vocabulary import gone, known
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
@@ -151,16 +150,13 @@ def test_the_messages_that_are_explained_exist() -> None:
 def test_the_verdicts_of_the_readme_are_the_expected_ones() -> None:
     text = (ROOT / "README.md").read_text("utf-8")
     shown = re.findall(r"^\| (C\d+): [^|]* \| ([^|]*) \| ([^|]*) \|", text, re.MULTILINE)
-    found = read_reference(declared()["claims"], ROOT / folder_of(RESULTS))
-    assert found is not None
+    found = read_references(ROOT / folder_of(RESULTS))["claims"]
     rows = found.frame[["claim", "verdict", "verdict_beyond"]]
     assert shown == list(rows.itertuples(index=False, name=None))
 
 
 def test_the_numbers_of_the_readme_s_picture_are_those_of_the_expected_tables() -> None:
-    table = declared()["reduced_reruns"]
-    found = read_reference(table, ROOT / folder_of(RESULTS))
-    assert found is not None
+    found = read_references(ROOT / folder_of(RESULTS))["reduced_reruns"]
     runs = trained(found.frame)
     runs = runs[runs.scene == "strain_poke"].set_index(["method", "r"])
     error = runs[runs.position_basis == "full"].relative_error_within_horizon.astype(float)

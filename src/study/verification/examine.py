@@ -71,10 +71,10 @@ class Examination:
         """Outcomes of claims, figures, tables, and of files that do not fit the study."""
         tables = {name: self.table(name) for name in declared()}
         figures = [self._figure(job, tables) for job in self.subject.plan.fixed["figures"]]
-        folder = Path(TABLE.at(self.subject.results, name="any")).parent
+        there = sorted(Path(TABLE.at(self.subject.results, name="any")).parent.glob("[!.]*.csv"))
         foreign = [
             Line("table", path.stem, Outcome.DIFFERS, f"{path} is no table of the study")
-            for path in sorted(folder.glob("[!.]*.csv"))
+            for path in there
             if path.stem not in declared()
         ]
         unfit = [
@@ -91,8 +91,8 @@ class Examination:
         Raises StorageError if its file is missing or damaged, or has columns not declared.
         """
         path, table = TABLE.at(self.subject.results, name=name), declared()[name]
-        if not self.intact(path):
-            raise StorageError(f"{path}: not there or damaged; run {self.subject.command(name)}")
+        if missing := self._missing(name, [path]):
+            raise StorageError(missing)
         if other := sorted(set(read_table(path).columns) - set(table.column_names)):
             raise StorageError(f"{path}: has the unknown column(s) {', '.join(other)}")
         return table.checked(read_table(path, table.column_names))
@@ -119,20 +119,17 @@ class Examination:
 
     def table(self, name: str) -> Line:
         """Compare the table ``name`` with the expected one and return the outcome."""
-        line = partial(Line, "table", name)
-        if missing := self._missing("table", name, [TABLE.at(self.subject.results, name=name)]):
-            return missing
-        if name not in self.expected:
-            return line(Outcome.NO_REFERENCE, "run verify --update")
-        table, reference = declared()[name], self.expected[name]
+        line, table = partial(Line, "table", name), declared()[name]
         try:
             frame = self.found(name)
         except StorageError as error:
-            return line(Outcome.DIFFERS, str(error))
+            there = self.intact(TABLE.at(self.subject.results, name=name))
+            return line(Outcome.DIFFERS if there else Outcome.MISSING, str(error))
+        if name not in self.expected:
+            return line(Outcome.NO_REFERENCE, "run verify --update")
         if self.outdated(name):
             return line(Outcome.DIFFERS, "it is not what the tables at hand give")
-        columns = {column.name: column for column in compare.kept(table)}
-        new = [name for name in columns if name not in reference.columns]
+        reference, columns = self.expected[name], compare.kept(table)
         known = frame.assign(**dict.fromkeys(set(frame) - set(reference.columns)))
         differences, compared = compare.judge(
             compare.Comparison(table, reference.frame, table.checked(known), self.context)
@@ -140,9 +137,9 @@ class Examination:
         if differences:
             more = f" and {len(differences) - 1} more" if differences[1:] else ""
             return line(Outcome.DIFFERS, differences[0] + more, tuple(differences))
-        if new:
+        if new := [column.name for column in columns if column.name not in reference.columns]:
             return line(Outcome.NO_REFERENCE, f"column(s) {', '.join(new)}: run verify --update")
-        if all(map(compare.identifies, columns.values())):
+        if all(map(compare.identifies, columns)):
             text = "its numbers are times or round-off; names and sizes agree"
             return line(Outcome.NOT_COMPARABLE, text)
         return line(Outcome.REPRODUCED, compared)
@@ -157,30 +154,25 @@ class Examination:
         names = dict.fromkeys([*expected.index, *found.index])
         return [_claim(str(name), expected, found) for name in names]
 
-    def _missing(self, kind: str, name: str, paths: Iterable[str]) -> Line | None:
-        for path in paths:
-            if not self.intact(path):
-                text = f"{path} is not there or damaged; make it by {self.subject.command(name)}"
-                return Line(kind, name, Outcome.MISSING, text)
-        return None
+    def _missing(self, name: str, paths: Iterable[str]) -> str:
+        """Text about the first of the ``paths`` that is not intact, with a command."""
+        lost = next((path for path in paths if not self.intact(path)), None)
+        how = self.subject.command(name)
+        return f"{lost} is not there or damaged; make it by {how}" if lost else ""
 
     def _figure(self, figure: Job, tables: Mapping[str, Line]) -> Line:
-        name = figure.artifact.name
-        line = partial(Line, "figure", name)
-        paths = {TABLE.at(self.subject.results, name=table): table for table in declared()}
+        line = partial(Line, "figure", figure.artifact.name)
+        paths = {TABLE.at(self.subject.results, name=name): name for name in tables}
         read = [tables[paths[path]] for path in figure.files if path in paths]
         others = [p for p in figure.files if p.startswith("results/") and p not in paths]
-        if missing := self._missing("figure", name, figure.outputs.values()):
-            return missing
+        if missing := self._missing(figure.artifact.name, [*figure.outputs.values(), *others]):
+            return line(Outcome.MISSING, missing)
+        names = ", ".join(table.name for table in read)
         if bad := [table for table in read if table.outcome not in GOOD]:
             return line(bad[0].outcome, f"reads the table(s) {', '.join(b.name for b in bad)}")
-        if missing := self._missing("figure", name, others):
-            return missing
-        text = (
-            f"by the table(s) {', '.join(t.name for t in read)}" if read else "its files are intact"
-        )
         timed = read and all(table.outcome is Outcome.NOT_COMPARABLE for table in read)
-        return line(Outcome.NOT_COMPARABLE if timed else Outcome.REPRODUCED, text)
+        outcome = Outcome.NOT_COMPARABLE if timed else Outcome.REPRODUCED
+        return line(outcome, f"by the table(s) {names}" if read else "its files are intact")
 
 
 def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
@@ -188,7 +180,7 @@ def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
     if name not in expected.index or name not in found.index:
         text = "the claim is new" if name in found.index else "the claim is gone"
         return Line("claim", name, Outcome.DIFFERS, text)
-    same, changed, worst = [], [], Outcome.REPRODUCED
+    same, changed, outcomes = [], [], set()
     for column, (part, words) in PARTS.items():
         a, b = str(expected.loc[name, column]), str(found.loc[name, column])
         if a == b:
@@ -197,6 +189,6 @@ def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
         tests = getattr(load_claims(Path(RULES)).get(name), part, ())
         timed = any(test.decides and test.timed for test in tests)
         changed.append(f"{words}: expected '{a}', found '{b}'" + timed * ", which rests on times")
-        if worst is not Outcome.DIFFERS:
-            worst = Outcome.NOT_COMPARABLE if timed else Outcome.DIFFERS
+        outcomes.add(Outcome.NOT_COMPARABLE if timed else Outcome.DIFFERS)
+    worst = max(outcomes, key=lambda o: o is Outcome.DIFFERS, default=Outcome.REPRODUCED)
     return Line("claim", name, worst, "; ".join(changed or same))

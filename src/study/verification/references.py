@@ -53,23 +53,19 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
     other.unlink(missing_ok=True)
 
 
-def read_reference(table: Table, folder: Path) -> Reference | None:
-    """Return the expected ``table`` in ``folder``; None if there is none."""
-    path = next((p for end in ENDS if (p := folder / f"{table.name}{end}").is_file()), None)
-    if path is None:
-        return None
-    try:
-        frame = pd.read_csv(path)
-    except (OSError, EOFError, lzma.LZMAError, ValueError) as error:
-        raise StorageError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
-    whole = frame.reindex(columns=list(table.column_names))
-    return Reference(table.checked(whole), tuple(frame.columns))
-
-
 def read_references(folder: Path) -> dict[str, Reference]:
     """Return name -> expected table in ``folder``; StorageError if one cannot be read."""
-    read = {name: read_reference(table, folder) for name, table in declared().items()}
-    return {name: reference for name, reference in read.items() if reference is not None}
+    found = {}
+    for name, table in declared().items():
+        for path in (p for end in ENDS if (p := folder / f"{name}{end}").is_file()):
+            try:
+                frame = pd.read_csv(path)
+            except (OSError, EOFError, lzma.LZMAError, ValueError) as error:
+                reason = " ".join(str(error).split())
+                raise StorageError(f"{path}: cannot be read ({reason})") from error
+            whole = table.checked(frame.reindex(columns=list(table.column_names)))
+            found[name] = Reference(whole, tuple(frame.columns))
+    return found
 
 
 def note(folder: Path, reason: str, day: date, code: str) -> None:

@@ -41,9 +41,10 @@ QUANTITIES: dict[Quantity, str] = {
 }
 # Default tolerance of numbers between two machines: absolute for "share", relative for others.
 TOLERANCES: dict[Quantity, float] = {"exact": 1e-8, "value": 1e-4, "error": 0.05, "share": 0.1}
-# Allowed difference between two machines for integers of quantity "share" (numbers of runs).
-TALLY = 2.0
+NUMBER_OF_RUNS_TOLERANCE = 2.0  # of integers of quantity "share", which are numbers of runs
+REFERENCE_ERROR_TOLERANCE = 0.5  # of estimated errors of references, relative: 0.28 was measured
 Kind = Literal["text", "integer", "number", "flag"]
+WORDS: tuple[Kind, ...] = ("text", "flag")  # kinds of columns without numbers
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?inf", re.ASCII | re.IGNORECASE)
 _DTYPES: dict[Kind, str] = {"integer": "Int64", "number": "float64", "flag": "boolean"}
 
@@ -75,20 +76,15 @@ class Column:
             return self.compared or "timed"
         if self.kind != "number":
             return "exact"
-        return "error" if "error" in self.name else "value"
+        return "error" if "error" in self.name or "deformation" in self.name else "value"
 
     @property
     def within(self) -> float:
-        """Allowed difference of a cell between machines: `tolerance` or, without it, a default.
-
-        The default is 0 for text, flags and integers (`TALLY` for integers of quantity "share"),
-        and for numbers it is in `TOLERANCES`.
-        """
-        if self.tolerance is not None:
-            return self.tolerance
-        if self.kind == "integer":
-            return TALLY if self.quantity == "share" else 0.0
-        return TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
+        """Allowed difference between machines: `tolerance` or a default, 0 but for numbers."""
+        if self.kind == "integer" and self.quantity == "share":
+            return NUMBER_OF_RUNS_TOLERANCE
+        default = TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
+        return default if self.tolerance is None else self.tolerance
 
     def cast(self, values: pd.Series) -> pd.Series:
         """Convert ``values`` to the type of the column; ValueError names the first unfit cell."""
@@ -175,8 +171,14 @@ _SHARED = (
     ),
     number("error_converged", "error of the positions before the horizon, of the converged run"),
     number("deformation_converged", "the deformation error against it"),
-    number("reference_error", "position error of the converged run itself, by a second solve"),
-    number("reference_deformation_error", "its deformation error"),
+    number(
+        "reference_error",
+        "position error of the converged run itself, by a second solve",
+        tolerance=REFERENCE_ERROR_TOLERANCE,
+    ),
+    number(
+        "reference_deformation_error", "its deformation error", tolerance=REFERENCE_ERROR_TOLERANCE
+    ),
     number(
         "playback_error",
         "error of playback before the horizon: of the recorded training motion in place of the run",
