@@ -230,7 +230,8 @@ def _cells(
         message = f"{place}: expected {e or 'nothing'}, found {f or 'nothing'}"
         size = distance[row] / tolerances[row] if tolerances[row] else np.inf
         yield size, message + off * bool(np.isfinite(distance[row]))
-    if not len(far) and column.tolerance is None and column.kind not in WORDS:
+    coarse = column.within > WRONG_TOLERANCE  # an estimate, of which no shift says anything
+    if not (len(far) or coarse or column.kind in WORDS):
         nonzero = stable & cells.fillna(0).ne(0).to_numpy(dtype=bool)
         rows, name = comparison.e[nonzero], f"{column.name} differs by a tenth of its tolerance"
         yield from _counted(rows, shifted[nonzero], name, SHIFTED_SHARE, SHIFTED_CELLS)

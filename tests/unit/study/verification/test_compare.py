@@ -19,6 +19,7 @@ COLUMNS = (
     number("shape_error", "of the shape"),
     number("energy_drift", "energy", compared="error"),
     number("stiffness", "a well-conditioned number"),
+    number("estimated_error", "a coarse estimate", tolerance=0.5),
     number("correlation", "a share", compared="share"),
     count("runs", "a number of runs"),
     text("outcome", "words of which a share may change", compared="error", tolerance=0.01),
@@ -37,7 +38,8 @@ def runs():
             "scene": scene, "group": "all", "method": ("deim", "ecsw", "qdeim")[max(0, part - 3)],
             "r": r, "elements_sampled": 10 * r, "finite": True, "frames": 60,
             "relative_error": 0.3 if scene == "wrong" else 0.01, "shape_error": 0.02,
-            "energy_drift": 0.2, "stiffness": 2.0, "correlation": 0.5, "runs": 9, "outcome": "good",
+            "energy_drift": 0.2, "stiffness": 2.0, "estimated_error": 0.01,
+            "correlation": 0.5, "runs": 9, "outcome": "good",
             "verdict": "holds", "ms": 1.0, "residual": 1e-15,
         }
         for part, scene in enumerate(SCENES)
@@ -64,6 +66,7 @@ AGREE = """
 relative_error 0 *1.000000000001 | stiffness 0 *1.000000000001 | stiffness 0 *1.00005
 relative_error 0 *1.03 | relative_error 16 *1.2 | energy_drift 16 *1.2 | correlation 0 =0.55
 runs 0 =11 | elements_sampled 39 =81 | r 39 =9 | outcome 6:9 ="bad" | ms 0:8 *9 | residual 0:8 *9
+estimated_error 0:8 *1.4
 relative_error 8 *6 | relative_error 24 *6 | finite 8 =False | finite 24 =False | frames 8 =3
 shape_error 8 =nan | relative_error 8:16 *3 | stiffness 8:16 *1.1
 """
@@ -71,6 +74,7 @@ DIFFER = """
 stiffness 0:8 *1.00005 | stiffness 0 *1.0002 | relative_error 0:8 *1.03 | relative_error 0 *1.1
 relative_error 16 *1.5 | energy_drift 0 *1.2 | shape_error 16 *1.2 | relative_error 0 =inf
 relative_error 0 =-inf | relative_error 0 =nan | relative_error 0 =0.0 | relative_error 0 =-0.01
+estimated_error 0 *2.5
 correlation 0 =0.65 | runs 0 =12 | finite 0 =False | finite 0:3 =None | frames 0 =59
 elements_sampled 0 =11 | elements_sampled 39 =120 | r 7 =9 | outcome 6:10 ="bad" | verdict 8 ="no"
 relative_error 8:16 *6 | relative_error 24:32 *6 | relative_error 8:16 =1e30 | finite 8:16 =False
