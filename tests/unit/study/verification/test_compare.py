@@ -11,6 +11,7 @@ from pdrom.core.store import read_table
 from places import ROOT
 from study.tables import declared
 from study.tables.kit.declaration import TOLERANCES, Table, count, number, shared, text, timed
+from study.tables.kit.results import OWN_ERRORS
 from study.verification.compare import REDUCED_RUN, Comparison, Context, identities, judge, kept
 from study.verification.references import read_references
 
@@ -165,3 +166,9 @@ def test_any_content_of_a_cell_is_a_difference_or_an_error_in_one_line(
         found = [str(error)]
     assert found
     assert "\n" not in "".join(found)
+
+
+def test_deformation_errors_are_errors_and_those_of_references_are_estimates():
+    columns = [column for table in declared().values() for column in table.columns]
+    assert {c.quantity for c in columns if "deformation" in c.name} == {"error"}
+    assert {c.within for c in columns if c.name in OWN_ERRORS} == {0.5}
