@@ -43,7 +43,7 @@ class Reference(ConfigModel):
     limit : largest number of evaluations of a frame's objective
     """
 
-    tolerance: kit.Tolerance = 1e-8
+    tolerance: kit.Tolerance = 1e-7
     limit: Annotated[int, Field(ge=2)] = 20_000
 
 
