@@ -11,14 +11,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pdrom.core.errors import StorageError
+from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.store import atomic_path, read_table, write_table, write_text
 from study.article.build import INDEX, VERIFIED
 from study.artifact.paths import ARTICLE, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
-from study.verification.command import status_of, update, verify_tables
+from study.verification.command import status_of, update, verify, verify_tables
 from study.verification.examine import Examination, Line, Outcome
+from study.verification.files import differing
 from study.verification.references import LOG, folder_of
 from study.verification.subject import Status
 
@@ -157,3 +158,47 @@ def test_a_table_that_was_cut_one_that_is_lost_and_one_that_is_none_are_noticed(
     lines = {line.name: line.outcome for line in examination.lines() if line.kind == "table"}
     assert lines["ladder"] is lines["more"] is Outcome.DIFFERS
     assert lines["stability"] is Outcome.MISSING
+
+
+def test_a_configuration_without_references_and_options_that_clash_are_refused(results, tmp_path):
+    own = tmp_path / "other.yaml"
+    own.write_text("ranks: [6]\n")
+    with pytest.raises(ConfigurationError, match="no expected tables of this configuration"):
+        verify(["--configfile", str(own)])
+    for words in (["--no-such-option"], ["--update", "--files"]):
+        with pytest.raises(SystemExit):
+            verify(words)
+
+
+def test_an_update_writes_every_table_and_notes_the_reason(results, subject, monkeypatch):
+    monkeypatch.setattr("study.verification.command.faults", lambda *_: {})
+    folder = folder_of(RESULTS)
+    before = {path.name: path.read_bytes() for path in folder.glob("*.csv*")}
+    (folder / "ladder.csv").unlink()
+    (folder / "of_an_older_version.csv.xz").touch()
+    assert [update(subject, why) for why in (" a new\n method ", "second")] == [folder] * 2
+    assert re.search(r"\): a new method\n- .*\): second\n$", (folder / LOG).read_text("utf-8"))
+    (folder / LOG).unlink()
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_tables_that_a_run_would_make_again_are_not_expected(results, subject):
+    """No job of this plan has written the tables at hand."""
+    with pytest.raises(StorageError, match=r"results/.*: settings or code have changed; run"):
+        update(subject, "a new method")
+    assert not (folder_of(RESULTS) / LOG).exists()
+
+
+def test_a_figure_is_drawn_again_to_the_byte(results, subject):
+    """Replaced, with new checksums, by a figure that its table does not give, or another's."""
+    job = subject.plan.job(declarations()["local_share"])
+    job.make(job.outputs)
+    assert differing(job) == []
+    edited, *_ = outputs = list(job.outputs.values())
+    content = Path(edited).read_bytes()
+    with atomic_path(edited) as temporary:
+        temporary.write_bytes(content + b"%")
+    assert differing(job) == [edited]
+    table = next(path for path in job.files if path.endswith("local_share.csv"))
+    write_table(read_table(table).assign(local_share=0.5), table)
+    assert differing(job) == outputs
