@@ -54,7 +54,7 @@ wait_for_job "$run" "$folder/.cache/first.log"
 cancel
 if wait "$run"; then fail "the run did not notice"; fi
 tail -n 6 "$folder/.cache/first.log"
-grep -q "cancelled" "$folder/.cache/first.log" || fail "the run does not say that a job was cancelled"
+grep -qi "cancelled" "$folder/.cache/first.log" || fail "the run does not say that a job was cancelled"
 
 step "the same command, and a job that is cancelled"
 "${command[@]}" >"$folder/.cache/second.log" 2>&1 &

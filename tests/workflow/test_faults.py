@@ -82,7 +82,7 @@ def test_lost_rows_and_a_killed_job_are_named_and_made_again(undisturbed, sandbo
     assert f"set aside as {Path(SNAPSHOTS).name}.damaged, the next run" in last_lines(output)
     status, output = sandbox.run(TABLE, fault="kill:reconstruction_error")
     assert status != 0
-    expected = f"job reconstruction_error_table failed while making {TABLE}: killed (SIGKILL)"
+    expected = f"job reconstruction_error_table failed while making {TABLE}: ended by SIGKILL"
     assert expected in last_lines(output)
     assert not sandbox.path(TABLE).exists()
     heals(sandbox, undisturbed)
@@ -107,7 +107,7 @@ def test_a_job_that_is_killed_in_any_rule(rule, finished_study, tmp_path):
     output.unlink()
     status, said = sandbox.run(target, fault=f"kill:/\\.{re.escape(output.stem)}\\.[0-9a-f]{{16}}")
     assert status != 0
-    assert re.search(rf"job {rule} failed while making \S+: killed \(SIGKILL\)", last_lines(said))
+    assert re.search(rf"job {rule} failed while making \S+: ended by SIGKILL", last_lines(said))
     heals(sandbox, finished_study, target)
 
 
@@ -170,7 +170,7 @@ def test_a_run_whose_fork_server_is_killed_says_so_and_goes_on(undisturbed, fres
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 1
     assert "pdrom: job fom failed while making" in last_lines(output)
-    assert ": the process that jobs start from is gone: out of memory?" in last_lines(output)
+    assert ": exit status 69: out of memory?" in last_lines(output)
     heals(fresh, undisturbed)
 
 
