@@ -5,10 +5,8 @@ the last one of two equal keys, run code from a file with the key ``__use_yte__`
 traceback for a file that is not text.
 """
 
-import inspect
 import io
 import json
-import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, suppress
@@ -35,12 +33,7 @@ OWN_OUTPUT = ("logger", "quiet", "verbose", "printshellcmds", "debug_dag")
 # Options of every run. The greedy scheduler chooses jobs fast. Snakemake's default scheduler solves
 # an integer program at each choice, which takes more time than it saves, since jobs are short.
 OPTIONS = ("--scheduler", "greedy", "--rerun-incomplete")
-LINES = ("--logger", "pdrom")
-# Options with numbers that are at least one; others are at least zero.
-COUNTS = ("cores", "jobs", "local_cores", "max_threads")
-# Keys that Snakemake accepts after --config.
-KEY = re.compile(r"[A-Za-z_][\w-]*\w")
-YAML = (".yaml", ".yml", ".json")
+CORES, LINES = ("--cores", "all"), ("--logger", "pdrom")
 TEMPLATE_KEY = "__use_yte__"
 RECORD = Path(".snakemake/last_run.json")
 
@@ -50,16 +43,11 @@ class CommandLine:
 
     Raises ConfigurationError for a wrong option, or a target that was read as an option's value.
 
-    arguments : the whole command line
-    configfiles : files given by the option ``--configfile``, in order
-    settings : ``key=value`` pairs given by the option ``--config``
-    targets : names of files and rules to make
     report : file given by the option ``--report``, None without the option
     looks_only : True if no job runs and no result is written
     plans : True for a dry run (``-n``) without any other option of `LOOKS_ONLY`
-    own_output : True if an option of `OWN_OUTPUT` is given
     makes : True if results are made or a dry run plans to; False with ``--touch``, too
-    cores : True if a number of cores or jobs is given
+    more : options that this project adds
     executor : Snakemake's executor, from command line or profile; None runs jobs on this machine
     """
 
@@ -75,22 +63,14 @@ class CommandLine:
         self.looks_only = bool(looks) or reports
         self.plans = looks == ["dryrun"]
         self.makes = (self.plans or not self.looks_only) and not found["touch"]
-        self.own_output = any(found[name] is not None and found[name] for name in OWN_OUTPUT)
-        self.cores = found["cores"] is not None or found["jobs"] is not None
+        own_output = any(found[name] is not None and found[name] for name in OWN_OUTPUT)
+        cores = found["cores"] is not None or found["jobs"] is not None
+        lines = self.makes and not own_output
+        self.more = [*(() if cores else CORES), *(LINES if lines else ()), *OPTIONS]
         self.executor: str | None = found["executor"]
         for key, _, text in (setting.partition("=") for setting in self.settings):
             with suppress(YAMLError):  # Snakemake takes such a value as a text
                 require_as_written(text, "--config", key)
-        swallowed = [name for name in self.settings if "=" not in name]
-        swallowed += [name for name in self.configfiles[1:] if Path(name).suffix not in YAML]
-        if swallowed:
-            raise ConfigurationError(
-                f"'{swallowed[0]}': no KEY=VALUE or YAML file, as the option before it takes; "
-                "write two hyphens before the targets: ./reproduce OPTIONS -- TARGETS"
-            )
-        for key in (setting.partition("=")[0] for setting in self.settings):
-            if not KEY.fullmatch(key):
-                raise ConfigurationError(f"--config {key}=...: no such key (see config/README.md)")
 
     @property
     def configuration(self) -> list[str]:
@@ -111,35 +91,33 @@ class CommandLine:
 def parsed(arguments: Sequence[str]) -> dict[str, Any]:
     """Return the options that Snakemake finds in ``arguments`` and the profiles that they name."""
     # not imported at the top: jobs import this module, too, and need no parser
-    from snakemake.cli import parse_args
+    from snakemake.cli import parse_args, parse_config
 
     said, fault = io.StringIO(), ""
     try:
         with redirect_stderr(said):
             found = vars(parse_args(list(arguments))[1])
+            parse_config(found["config"])
     except SystemExit as end:
         if not end.code:
             raise  # after --help or --version
-        fault = said.getvalue().strip().splitlines()[-1].rpartition("rror: ")[2]
+        fault = said.getvalue().strip().rpartition("rror: ")[2]
     except Exception as error:
-        # the parser's function for an option has its name and values
-        calls = [each.frame.f_locals for each in inspect.trace(0) if each.function == "take_action"]
-        words = [[call["option_string"], *call["argument_strings"]] for call in calls]
-        fault = f"{' '.join(words[-1]) if words else 'options'}: {error}"
+        fault = f"{' '.join(arguments)}: {error}"
     else:
         options = [word.partition("=")[0] for word in _before_targets(arguments)]
-        if sum(each == "--config" for each in options) > 1:
-            fault = "--config is given twice; write all settings after the first"
-        if sum(each.startswith("--configf") for each in options) > 1:
-            fault = "--configfile is given twice; write all files after the first"
-        if found["config"] == []:
-            fault = "--config: KEY=VALUE is missing"
-        for name, value in found.items():
-            least = int(name in COUNTS)
-            if isinstance(value, int | float) and value < least and value is not False:
-                fault = f"--{name.replace('_', '-')} {value}: at least {least} is required"
+        for begin in ("--config", "--configfile"):
+            if sum(option in (begin, f"{begin}s") for option in options) > 1:
+                fault = f"{begin} is given twice; write all values after the first"
+        for name in ("cores", "jobs"):
+            if isinstance(found[name], int) and found[name] < 1:
+                fault = f"--{name} {found[name]}: at least 1 is required"
+        for name in (found["configfile"] or ())[1:]:
+            if not Path(name).suffix:
+                fault = f"--configfile {name}: no YAML file"
     if fault:
-        raise ConfigurationError(f"{fault} (.venv/bin/snakemake --help explains the options)")
+        more = "write -- before targets; .venv/bin/snakemake --help explains the options"
+        raise ConfigurationError(f"{fault} ({more})")
     return found
 
 
@@ -150,31 +128,25 @@ def _before_targets(arguments: Sequence[str]) -> list[str]:
 
 def completed(arguments: Sequence[str]) -> list[str]:
     """Return ``arguments`` with the options that Snakemake needs, and files in place of names."""
-    if "figure" in arguments:
-        from study.pipeline.targets import figure_files  # slow, so not imported at the top
+    # not imported at the top: it loads NumPy, and environment variables must be set before
+    from study.pipeline.targets import figure_file, files
 
+    if "figure" in arguments:
         at = list(arguments).index("figure")
         named = list(takewhile(lambda word: not word.startswith("-"), arguments[at + 1 :]))
         others = [*arguments[:at], *arguments[at + 1 + len(named) :]]
-        options = _before_targets(others)
-        arguments = [*options, "--", *others[len(options) + 1 :], *figure_files(named)]
+        arguments = [*others, *([] if "--" in others else ["--"]), *map(figure_file, named or [""])]
     command = CommandLine(arguments)
     if command.report and not command.configuration and recall():
         sys.stderr.write(f"reproduce: a report of the last run, {' '.join(recall())}\n")
         command = CommandLine(command.rewritten(recall(), {t: [t] for t in command.targets}))
     check_files(command.configfiles)
-    cores = () if command.cores else ("--cores", "all")
-    lines = LINES if command.makes and not command.own_output else ()
-    own, made = folders(command.configfiles, command.settings), {}
-    if command.targets:
-        from study.pipeline.targets import files  # slow, so not imported at the top
-
-        made = {target: files(target, own) for target in command.targets}
-        # print the files if a target is a name and not a path
-        for target, found in made.items():
-            if found != [target]:
-                sys.stderr.write(f"reproduce: {target}: {', '.join(found)}\n")
-    return command.rewritten([*cores, *lines, *OPTIONS], made)
+    own = folders(command.configfiles, command.settings)
+    made = {target: files(target, own) for target in command.targets}
+    for target, found in made.items():
+        if found != [target]:
+            sys.stderr.write(f"reproduce: {target}: {', '.join(found)}\n")
+    return command.rewritten(command.more, made)
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
@@ -212,8 +184,4 @@ def remember(command: CommandLine) -> None:
 
 def recall() -> list[str]:
     """Options that name the last run's configuration; [] for the default, or without a last run."""
-    try:
-        record = json.loads(RECORD.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return []
-    return record if isinstance(record, list) and all(isinstance(r, str) for r in record) else []
+    return list(json.loads(RECORD.read_text("utf-8"))) if RECORD.is_file() else []

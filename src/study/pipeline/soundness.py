@@ -2,14 +2,12 @@
 
 ``./reproduce`` runs this check before it accepts a new environment. A linear algebra library can be
 broken on a processor for some shapes of matrices, and can end the process without a message. The
-name of each calculation is therefore printed before it is made.
+shape of each matrix is therefore printed before the calculations.
 """
 
 import faulthandler
 import sys
-from collections.abc import Iterator
 from itertools import product
-from typing import Any
 
 from pdrom.core.environment import settle
 
@@ -21,49 +19,29 @@ TOLERANCE = 1e-9
 
 
 def main() -> None:
-    """Make all test `calculations`; if one fails or crashes, the last line of output names it."""
-    faulthandler.enable()
+    """Calculate with matrices X of many shapes; the last line of output names the last shape."""
+    faulthandler.enable()  # the stack of a crash has the line of the calculation
     settle()
-    for what in calculations():
-        sys.stdout.write(f"{what}\n")
-        sys.stdout.flush()
-
-
-def calculations() -> Iterator[str]:
-    """Yield the name of each test calculation, before it is made, so that it is printed first."""
     import numpy as np
     import scipy.linalg
 
     random = np.random.default_rng(1)
     for rows, columns in product(ROWS, COLUMNS):
+        sys.stdout.write(f"NumPy or SciPy with X of {rows} x {columns}\n")
+        sys.stdout.flush()
         x = random.standard_normal((rows, columns))
-        # reference product for comparison; einsum calls no linear algebra library here
-        gram = np.einsum("ij,ik->jk", x, x)
-        where = f"with X of {rows} x {columns}"
-        yield f"numpy: X.T @ (2 * X) {where}"
-        compare(x.T @ (2 * x), 2 * gram)
-        yield f"numpy: X.T @ X {where}"
-        compare(x.T @ x, gram)
-        yield f"scipy: X.T @ X {where}"
-        compare(scipy.linalg.blas.dgemm(1.0, x, x, trans_a=True), gram)
-        yield f"scipy: pivoted QR factors {where}"
+        gram = np.einsum("ij,ik->jk", x, x)  # calls no linear algebra library here
+        regular = gram + rows * np.eye(columns)
+        made = [(x.T @ (2 * x), 2 * gram), (x.T @ x, gram)]
+        made += [(scipy.linalg.blas.dgemm(1.0, x, x, trans_a=True), gram)]
         q, r, order = scipy.linalg.qr(x, mode="economic", pivoting=True)
-        compare(q @ r, x[:, order])
-        for name, linalg in (("numpy", np.linalg), ("scipy", scipy.linalg)):
-            yield f"{name}: singular values {where}"
+        made += [(q @ r, x[:, order])]
+        for linalg in (np.linalg, scipy.linalg):
             left, values, right = linalg.svd(x, full_matrices=False)
-            compare((left * values) @ right, x)
-            yield f"{name}: solution of a system of {columns} unknowns"
-            regular = gram + rows * np.eye(columns)
-            compare(regular @ linalg.solve(regular, x.T), x.T)
-
-
-def compare(found: Any, expected: Any) -> None:
-    """Exit if ``found`` and ``expected`` differ by more than `TOLERANCE` or are not finite."""
-    import numpy as np
-
-    if not np.abs(found - expected).max() <= TOLERANCE * max(np.abs(expected).max(), 1.0):
-        sys.exit("a wrong result")
+            made += [((left * values) @ right, x), (regular @ linalg.solve(regular, x.T), x.T)]
+        for number, (found, expected) in enumerate(made):
+            if not np.abs(found - expected).max() <= TOLERANCE * max(np.abs(expected).max(), 1.0):
+                sys.exit(f"a wrong result of calculation {number}")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 A target is the number or name of a figure, the name of a table or of a rule, or a path.
 """
 
-import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 from pdrom.core.errors import ConfigurationError, choices, suggestion
 from study.artifact import paths
 from study.figures.kit.declaration import declarations
-from study.paper.source import SUPPLEMENT, figure_numbers
+from study.paper.source import figure_numbers
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.scenes import scene_names
@@ -21,29 +20,18 @@ from study.tables import declared
 PREPRINT = "preprint:"
 
 
-def figure_files(words: Sequence[str]) -> list[str]:
-    """Return the default paths of the figures that ``words`` name; they are printed, too.
+def figure_file(word: str) -> str:
+    """Return the default path of a figure: by its name, or its number in a document.
 
-    A figure is given by its name, its number in the paper (``3``), in the supplement (``S3``) or in
-    the preprint (``preprint:3``).
+    The number is that in the paper (``3``), the supplement (``S3``) or preprint (``preprint:3``).
     """
-    numbers, figures, found = figure_numbers(Path()), declarations(), []
-    known = {number: name for name, number in numbers.items()}
+    figures = declarations()
+    known = {number: name for name, number in figure_numbers(Path()).items()}
     known |= {f"{PREPRINT}{f.number}": name for name, f in figures.items() if f.number}
     known |= {name: name for name in figures}
-    if not words:
-        raise ConfigurationError(f"figure: its number or name is missing{choices('', known)}")
-    for word in words:
-        if word not in known:
-            raise ConfigurationError(f"figure {word}: there is none{choices(word, known)}")
-        name = known[word]
-        number = numbers.get(name, "")
-        document = "supplement" if number.startswith(SUPPLEMENT) else "main"
-        places = {f"{document}.pdf": number, "the preprint": figures[name].number}
-        label = ", ".join(f"figure {n} of {place}" for place, n in places.items() if n)
-        found.append(paths.FIGURE.at(paths.RESULTS, name=name))
-        sys.stderr.write(f"reproduce: figure {name} ({label or 'in no document'}): {found[-1]}\n")
-    return found
+    if word not in known:
+        raise ConfigurationError(f"figure '{word}': there is none{choices(word, known)}")
+    return paths.FIGURE.at(paths.RESULTS, name=known[word])
 
 
 def files(target: str, folders: Folders) -> list[str]:
@@ -64,11 +52,14 @@ def files(target: str, folders: Folders) -> list[str]:
 def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> None:
     """Raise ConfigurationError if none of Snakemake's ``rules`` makes one of ``targets``."""
     own = {rule.name for rule in rules if not rule.has_wildcards()}
-    for target in targets:
-        if target in own:
-            continue
+    for target in {*targets} - own:
         if not any(rule.is_producer(target) for rule in rules):
-            raise ConfigurationError(f"target '{target}': {_unknown(plan, target, own)}")
+            known = [*plan.own_files, *plan.figures, *plan.tables, *own]
+            raise ConfigurationError(
+                f"target '{target}': nothing makes it in this study{suggestion(target, known)}; "
+                "targets are names of figures and tables, and files, as "
+                f"{paths.FULL_ORDER.at(plan.results, scene='SCENE', run='train')}"
+            )
         for _, labels in paths.labels_in(target, plan.results):
             for label, allowed in _allowed(plan.study, labels):
                 if label in labels and labels[label] not in allowed:
@@ -83,14 +74,3 @@ def _allowed(study: Study, labels: Mapping[str, str]) -> Iterator[tuple[str, Col
     yield "basis", {spec.basis_id for spec in study.methods.values()}
     yield "mesh", study.every_mesh if "mesh" in labels else ()
     yield "group", study.scene(labels["scene"]).reduce if "group" in labels else ()
-
-
-def _unknown(plan: Plan, target: str, rules: Collection[str]) -> str:
-    """Return why ``target`` is unknown, for a message; suggestions may be names of ``rules``."""
-    if Path(target).stem in {**declared(), **declarations()}.keys() - {*plan.figures, *plan.tables}:
-        return "it is about scenes that this configuration does not have"
-    known = plan.own_files if "/" in target else [*plan.figures, *plan.tables, *rules]
-    return (
-        f"nothing makes it{suggestion(target, known)}; targets are names of figures and tables, "
-        f"and files, as {paths.FULL_ORDER.at(plan.results, scene='SCENE', run='train')}"
-    )

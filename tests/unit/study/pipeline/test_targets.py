@@ -67,23 +67,19 @@ def test_what_a_rule_makes_is_a_target(plan):
 
 
 @pytest.mark.parametrize(
-    ("target", "words"),
+    ("target", "parts"),
     [
-        ("results/tabels/scaling.csv", "did you mean 'results/tables/scaling.csv'?"),
-        ("scalign", "did you mean 'scaling'?"),
-        ("scaling_tabel", "did you mean 'scaling_table'?"),
-        ("results/fom/strain_opo/train.h5", "unknown scene 'strain_opo', did you mean 'strain_"),
-        ("results/meshes/none.h5", "unknown mesh 'none'"),
-        ("results/snapshots/strain_oop/strian.h5", "group 'strian', did you mean 'strain'?"),
-        ("results/snapshots/strain_oop/spring.h5", "unknown group 'spring'"),
-        ("results/reruns/strain_oop/strain/deem.h5", "method 'deem', did you mean 'deim'?"),
-        ("bar_twist", "files, as results/fom/SCENE/train.h5"),
-        ("fom", "nothing makes it"),
-        ("something/quite/different", "targets are names of figures and tables"),
+        ("results/tabels/scaling.csv", ["'results/tables/scaling.csv'"]),
+        ("scalign", ["'scaling'"]),
+        ("scaling_tabel", ["'scaling_table'"]),
+        ("results/fom/strain_opo/train.h5", ["scene 'strain_opo'", "'strain_oop'"]),
+        ("results/meshes/none.h5", ["mesh 'none'"]),
+        ("results/snapshots/strain_oop/strian.h5", ["group 'strian'", "'strain'"]),
+        ("results/reruns/strain_oop/strain/deem.h5", ["method 'deem'", "'deim'"]),
+        ("fom", ["names of figures and tables", "results/fom/SCENE/train.h5"]),
     ],
 )
-def test_what_nobody_makes_is_named_with_a_suggestion(target, words, plan):
+def test_what_nobody_makes_is_named_with_a_suggestion(target, parts, plan):
     with pytest.raises(ConfigurationError) as caught:
         check_targets(plan, [target], RULES)
-    assert words in str(caught.value)
-    assert f"'{target}'" in str(caught.value)
+    assert [part for part in (f"'{target}'", *parts) if part not in str(caught.value)] == []
