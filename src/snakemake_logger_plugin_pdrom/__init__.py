@@ -7,9 +7,10 @@ import time
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from study.pipeline.progress import Estimate
+from study.pipeline.progress import rounded
 
 NOTHING = "Nothing to be done"
+ENOUGH = 0.05  # share of the work in finished jobs that an estimate needs
 
 
 class LogHandler(LogHandlerBase):
@@ -27,7 +28,8 @@ class LogHandler(LogHandlerBase):
 
     def __post_init__(self) -> None:
         self._started = self._total = 0
-        self._estimate = Estimate({}, 0.0)
+        self._rest: dict[int, float] = {}  # number of a job -> its expected processor seconds
+        self._work = self._begun = 0.0
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a ``record`` about a job or problem; update the estimate of remaining time."""
@@ -36,13 +38,13 @@ class LogHandler(LogHandlerBase):
         if event == LogEvent.RUN_INFO:
             self._total = record.stats["total"]
         elif hasattr(record, "expected"):
-            self._estimate = Estimate(record.expected, record.created)
+            self._rest, self._begun = dict(record.expected), record.created
+            self._work = sum(self._rest.values())
         elif event == LogEvent.JOB_INFO and not self.common_settings.dryrun:
             self._started += 1
-            what = record.rule_msg or record.rule_name
-            self._write(record, what + self._estimate.words(record.created))
+            self._write(record, f"{record.rule_msg or record.rule_name}{self._done(record)}")
         elif event == LogEvent.JOB_FINISHED:
-            self._estimate.finish(record.job_id)
+            self._rest.pop(record.job_id, None)
         elif event == LogEvent.GROUP_ERROR:
             self._write(record, f"FAILED: batch {record.groupid}")
         elif event == LogEvent.JOB_ERROR and not getattr(record, "indent", False):
@@ -51,6 +53,14 @@ class LogHandler(LogHandlerBase):
             news = record.exception != "RuleException"
         if news:
             sys.stderr.write(text + "\n")
+
+    def _done(self, record: logging.LogRecord) -> str:
+        """Share of the work that is done, and the time left if it goes on as until now; or ""."""
+        done = self._work - sum(self._rest.values())
+        if done <= 0.0 or done < ENOUGH * self._work:
+            return ""
+        left = (record.created - self._begun) * (self._work / done - 1.0)
+        return f"   {done / self._work:.0%} done, {rounded(left)} left"
 
     def _write(self, record: logging.LogRecord, text: str) -> None:
         total = str(self._total)

@@ -1,17 +1,11 @@
-"""Estimate of a run's remaining time, and a list of the jobs that a dry run would start."""
+"""List of the jobs that a dry run would start, with reasons, and their expected time."""
 
 import logging
-import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-# An estimate needs this share of the work in finished jobs.
-ENOUGH = 0.05
-# Processor seconds that config/tiny.yaml spends on compiling; names of rules that compile nothing.
-COMPILING = 30.0
-IDLE = re.compile("figure_.*|.*_table|mesh|snapshots|pod|live_page|paper.*|article|all")
 FOLLOWS = "input is made again"
 # Beginnings of Snakemake's reasons for running a job -> our shorter texts.
 REASONS = {
@@ -24,30 +18,6 @@ REASONS = {
     "Params have changed": "settings or code have changed",
     "Input files updated by another job": FOLLOWS,
 }
-
-
-class Estimate:
-    """Estimate of a run's remaining time: the rest of the work goes on as fast as until now.
-
-    work : number of a job -> its expected processor seconds on all cores that the job uses
-    begun : time in s at which the run has begun
-    """
-
-    def __init__(self, work: Mapping[int, float], begun: float) -> None:
-        self._rest = dict(work)
-        self._total, self._begun = sum(work.values()), begun
-
-    def finish(self, job: int) -> None:
-        """Count the work of the ``job`` of this number as done."""
-        self._rest.pop(job, None)
-
-    def words(self, now: float) -> str:
-        """Share of the work that is done at time ``now`` (in s), and remaining time; or ""."""
-        done = self._total - sum(self._rest.values())
-        if done <= 0.0 or done < ENOUGH * self._total:
-            return ""
-        left = (now - self._begun) * (self._total / done - 1.0)
-        return f"   {done / self._total:.0%} done, {rounded(left)} left"
 
 
 def rounded(seconds: float) -> str:
@@ -68,11 +38,10 @@ class Preview(logging.Handler):
     """
 
     def __init__(
-        self, seconds: Callable[[str], float], cores: int, faults: Mapping[str, str], compiles: bool
+        self, seconds: Callable[[str], float], cores: int, faults: Mapping[str, str]
     ) -> None:
         super().__init__(logging.INFO)
-        self._faults, self._compiles = faults, compiles
-        self._of_job, self._cores = seconds, cores
+        self._seconds, self._cores, self._faults = seconds, cores, faults
         self._jobs: Counter[str] = Counter()
         self._reasons: defaultdict[str, set[str]] = defaultdict(set)
         self._processor = self._wall = 0.0
@@ -85,23 +54,21 @@ class Preview(logging.Handler):
         known = {self._faults[path] for path in record.output if path in self._faults}
         self._reasons[record.rule_name] |= known or shortened(record.reason)
         if record.log:  # rules without a log only collect targets and take no time
-            seconds = self._of_job(str(record.log[0]))
+            seconds = self._seconds(str(record.log[0]))
             self._processor += seconds
             self._wall += seconds * min(record.threads, self._cores) / self._cores
 
     def text(self) -> str:
         """Text with one line per rule, then the totals; empty if no job would run."""
         width = max(map(len, self._jobs), default=0)
-        text = "".join(
+        lines = [
             f"{count:>5} {rule:<{width}}  {', '.join(sorted(self._reasons[rule]))}\n"
             for rule, count in self._jobs.items()
-        )
-        own = COMPILING * (self._compiles and not all(map(IDLE.fullmatch, self._jobs)))
+        ]
         cores = f"{self._cores} core{'s' * (self._cores > 1)}"
-        total = f"pdrom: {self._jobs.total()} jobs, {rounded(self._wall + own)} on {cores}"
-        more = f", of which up to {own:.0f} s compile kernels" if own else ""
-        total += f", {rounded(self._processor + own)} of processor time{more}"
-        return text and f"{text}{total}\n"
+        total = f"pdrom: {self._jobs.total()} jobs, {rounded(self._wall)} on {cores}"
+        total += f", {rounded(self._processor)} of processor time\n"
+        return "".join([*lines, total]) if lines else ""
 
 
 def shortened(reason: str) -> set[str]:

@@ -93,7 +93,7 @@ class Run:
                 sys.stderr.write(f"pdrom: {path}: {fault}{aside}; it is made again\n")
         force(workflow, found)
         if self.command.plans:
-            preview = Preview(expected_seconds(plan), cores, found, not are_compiled())
+            preview = Preview(expected_seconds(plan), cores, found)
             logging.getLogger("snakemake.logging").addHandler(preview)
             atexit.register(lambda: sys.stdout.write(preview.text()))
 

@@ -121,7 +121,7 @@ def job(rule, reason, *logs, threads=1):
 
 def test_jobs_are_counted_by_rule_and_their_times_added():
     seconds = {"fom/a.log": 600.0, "fom/b.log": 1800.0, "timing.log": 1200.0}
-    preview = Preview(seconds.__getitem__, 2, {"b.csv": "output is damaged"}, False)
+    preview = Preview(seconds.__getitem__, 2, {"b.csv": "output is damaged"})
     preview.emit(logging.makeLogRecord({"msg": "Nothing to be done"}))
     assert preview.text() == ""
     preview.emit(job("fom", "Missing output files: a", "fom/a.log"))
@@ -134,11 +134,3 @@ def test_jobs_are_counted_by_rule_and_their_times_added():
         "    1 all     input is made again",
         "pdrom: 4 jobs, about 40 min on 2 cores, about 60 min of processor time",
     ]
-
-
-def test_compiling_counts_unless_only_tables_and_figures_are_made():
-    preview = Preview(lambda log: 50.0, 2, {}, True)
-    preview.emit(job("figure_bar_runs", "Params have changed", "figure.log"))
-    assert preview.text().endswith("less than a minute of processor time\n")
-    preview.emit(job("fom", "Forced execution", "fom/a.log"))
-    assert "about 2 min of processor time, of which up to 30 s compile kernels" in preview.text()
