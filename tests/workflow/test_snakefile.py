@@ -101,7 +101,7 @@ def test_a_fresh_clone_plans_the_whole_study_beside_a_run_and_starts_no_other(cl
     assert f"another run (process {os.getpid()} on " in refused
     assert done.returncode == 0, done.stderr
     log = done.stdout + done.stderr
-    assert "Manuscript paper/main.pdf, paper/supplement.pdf" in log
+    assert "Paper paper/main.pdf" in log
     total = int(re.search(r"^total +(\d+)$", log, re.MULTILINE)[1])
     assert total > 100
     told = rf"^pdrom: {total} jobs, about \d+ min on 1 core, about \d+ min of processor time$"

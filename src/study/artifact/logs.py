@@ -3,7 +3,6 @@
 Snakemake's ``benchmark:`` measures only every 30 s, which is longer than most jobs take.
 """
 
-import errno
 import faulthandler
 import logging
 import re
@@ -64,7 +63,7 @@ def job_log(path: str) -> Iterator[logging.Logger]:
         logger.error("interrupted")
         sys.exit(INTERRUPTED)
     except Exception as error:
-        fault = _fault(error)
+        fault = f"{type(error).__name__}: {error}"
         logger.error("%s (traceback in %s)\n%s", fault, path, traceback.format_exc())
         sys.exit(f"pdrom: {fault} (traceback in {path})")
     finally:
@@ -90,14 +89,6 @@ def warnings_to(stream: TextIO | None, form: str = "pdrom: warning: %(message)s"
     finally:
         for logger in loggers:
             logger.removeHandler(handler)
-
-
-def _fault(error: Exception) -> str:
-    if isinstance(error, MemoryError):
-        return f"out of memory ({error})" if str(error) else "out of memory"
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return f"no space left on the disk ({error})"
-    return f"{type(error).__name__}: {error}"
 
 
 class Usage(NamedTuple):

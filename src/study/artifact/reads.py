@@ -76,22 +76,12 @@ class EditedFiles:
 
 @dataclass(frozen=True)
 class ProjectFile(EditedFiles):
-    """A file edited by hand, given by its path in the project."""
+    """A file edited by hand, or a tuple of several, given by the path in the project."""
 
-    path: str
-
-    def paths(self, sources: Sources, labels: Labels) -> Paths:
-        return self.path
-
-
-@dataclass(frozen=True)
-class ProjectFiles(EditedFiles):
-    """Files edited by hand, given by their paths in the project."""
-
-    named: tuple[str, ...]
+    path: str | tuple[str, ...]
 
     def paths(self, sources: Sources, labels: Labels) -> Paths:
-        return list(self.named)
+        return self.path if isinstance(self.path, str) else list(self.path)
 
 
 @dataclass(frozen=True)
@@ -136,6 +126,6 @@ class Settings:
 
 
 # An input declared as a `Place` (kind of file) is the file of this kind for the job's scene etc.
-FileRead = Every | TableOf | ProjectFile | ProjectFiles | Recorded | SourcesOf | Place
+FileRead = Every | TableOf | ProjectFile | Recorded | SourcesOf | Place
 SettingRead = Setting | Settings
 Read = FileRead | SettingRead

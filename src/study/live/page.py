@@ -10,7 +10,7 @@ from pdrom.core.store import read_text, write_text
 from pdrom.view.page import LIVE, page_of
 from study.artifact.artifact import Artifact
 from study.artifact.paths import LIVE_MODEL, LIVE_PAGE, File
-from study.artifact.reads import Every, ProjectFiles
+from study.artifact.reads import Every, ProjectFile
 
 # Folder of the model files, relative to the page.
 MODELS = Path(LIVE_MODEL.pattern).parent.name
@@ -40,7 +40,7 @@ live_page = Artifact(
     "Page on which models run",
     {
         "models": Every(LIVE_MODEL),
-        "parts": ProjectFiles(tuple(f"src/pdrom/view/{name}" for name in LIVE)),
+        "parts": ProjectFile(tuple(f"src/pdrom/view/{name}" for name in LIVE)),
     },
     {"out": LIVE_PAGE},
     _write,

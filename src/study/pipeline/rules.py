@@ -14,6 +14,7 @@ SHOWN = {
     "tables": {"table": "Tables"},
     "figures": {"png": "Figures"},
     "article": {"out": "Page", "main": "Page"},
+    "paper": {"main": "Manuscript", "supplement": "Manuscript"},
 }
 # Attributes of a job that become parameters of its rule: Snakemake reruns the job if one changes.
 PARAMETERS = ("settings", "content", "code")
@@ -63,14 +64,8 @@ def _fixed(plan: Plan, job: Job, folder: str) -> SimpleNamespace:
     """Snakemake rule of ``job``, the only one of its artifact, with its log in logs/``folder``."""
     artifact, outputs = job.artifact, job.outputs
     params = {"artifact": artifact.address, **{name: getattr(job, name) for name in PARAMETERS}}
-    message, shown = artifact.title, SHOWN.get(folder, {})
-    if folder in ("tables", "figures"):
-        message = f"{folder.capitalize().removesuffix('s')} {artifact.name}"
-    elif "out" in outputs:
-        message = f"Page {outputs['out']}"
-    elif artifact.name == "paper":
-        message = f"Manuscript {', '.join(outputs.values())}"
-        shown = dict.fromkeys(outputs, "Manuscript")
+    # the inputs of the manuscript have names of documents, too
+    chapters = {} if artifact.name == "paper_inputs" else SHOWN[folder]
     labels = {"name": artifact.name, "title": to_plain(artifact.title)}
     return SimpleNamespace(
         name=artifact.rule,
@@ -81,6 +76,6 @@ def _fixed(plan: Plan, job: Job, folder: str) -> SimpleNamespace:
         threads=1,
         resources={},
         params=params,
-        message=message,
-        shown={n: {"category": c, "labels": labels} for n, c in shown.items() if n in outputs},
+        message=f"{folder.capitalize().removesuffix('s')} {next(iter(outputs.values()))}",
+        shown={n: {"category": c, "labels": labels} for n, c in chapters.items() if n in outputs},
     )

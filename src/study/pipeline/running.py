@@ -8,7 +8,6 @@ would wait for them for minutes.
 import errno
 import fcntl
 import os
-import re
 import shutil
 import signal
 import socket
@@ -53,23 +52,14 @@ def hold() -> int:
         holder = os.read(descriptor, 300).decode(errors="replace").strip()
         os.close(descriptor)
         raise PdromError(
-            f"another run ({holder or 'just started'}) is at work in this folder; {_advice(holder)}"
+            f"another run ({holder or 'just started'}) is at work in this folder; wait for its "
+            "end, -n works meanwhile"
         ) from None
     except OSError as error:
         raise PdromError(f"{LOCK}: cannot be written or locked; {blocked(error)}") from error
     os.ftruncate(descriptor, 0)
     os.write(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
     return descriptor
-
-
-def _advice(holder: str) -> str:
-    """Return advice on the run of ``holder``, which may be stopped, as by Ctrl-Z."""
-    number = re.fullmatch(rf"process (\d+) on {re.escape(socket.gethostname())}", holder)
-    with suppress(psutil.Error):
-        if number and psutil.Process(int(number[1])).status() == psutil.STATUS_STOPPED:
-            pid = number[1]
-            return f"it is stopped: kill -CONT {pid} continues it, kill -KILL {pid} ends it"
-    return "wait for its end, -n works meanwhile"
 
 
 def stop(note: Callable[[int], None]) -> Callable[[int, object], None]:

@@ -26,7 +26,7 @@ from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import reduced_state
 from pdrom.reduction.subspace.training import make_columns, sampled_models
 from study.artifact.paths import HARD_CASES, File
-from study.artifact.reads import ProjectFiles, Setting
+from study.artifact.reads import ProjectFile, Setting
 from study.experiments.hard_cases import record
 from study.experiments.hard_cases.catalogue import CASES, MESHES, reducible_cases
 from study.experiments.kit.base import experiment
@@ -218,7 +218,7 @@ class HardCases(ConfigModel):
 @experiment(
     "Hard cases of every reduction",
     reads={
-        "meshes": ProjectFiles(tuple(f"config/scenes/meshes/{name}" for name in MESHES)),
+        "meshes": ProjectFile(tuple(f"config/scenes/meshes/{name}" for name in MESHES)),
         "every_method": Setting("every_method"),
         "asked": Setting("hard_cases"),
     },

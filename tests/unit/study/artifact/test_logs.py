@@ -67,16 +67,12 @@ def test_in_a_job_alone_libraries_have_one_thread_and_damaged_results_are_set_as
 @pytest.mark.parametrize(
     ("failure", "said"),
     [
-        (MemoryError("Unable to allocate 9 GiB"), "out of memory (Unable to allocate 9 GiB)"),
-        (MemoryError(), "out of memory"),
-        (OSError(errno.ENOSPC, "No space left on device", "a.h5"), "no space left on the disk ("),
-        (OSError(errno.EDQUOT, "Disk quota exceeded"), "no space left on the disk ("),
-        (OSError(errno.EIO, "Input/output error"), "OSError: [Errno 5] Input/output error"),
-        (ZeroDivisionError("by zero"), "ZeroDivisionError: by zero (traceback in "),
+        (MemoryError("Unable to allocate 9 GiB"), "MemoryError: Unable to allocate 9 GiB"),
+        (OSError(errno.ENOSPC, "No space", "a.h5"), "OSError: [Errno 28] No space: 'a.h5'"),
         (MeshError("a.obj: vertex 3 is nan"), "a.obj: vertex 3 is nan"),
     ],
 )
-def test_mistakes_and_lack_of_memory_or_space_are_said_in_words(path, failure, said):
+def test_a_failed_job_ends_with_one_line(path, failure, said):
     """Those of the user in one line without a traceback, which the log has of all others."""
     with pytest.raises(SystemExit) as caught, job_log(str(path)):
         raise failure

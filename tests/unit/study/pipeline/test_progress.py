@@ -26,7 +26,9 @@ def emit(capsys):
     def send(*records, dryrun=False):
         handler = plugin.log_handler(OutputSettings(dryrun=dryrun), None)
         for record in records:
-            handler.handle(logging.makeLogRecord({"created": 0.0, "levelno": logging.INFO, **record}))
+            handler.handle(
+                logging.makeLogRecord({"created": 0.0, "levelno": logging.INFO, **record})
+            )
         return capsys.readouterr().err.splitlines()
 
     return send

@@ -4,9 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
-import psutil
 import pytest
 
 from pdrom.core.errors import PdromError
@@ -65,19 +63,6 @@ def test_a_lock_is_not_inherited_by_jobs():
         os.close(descriptor)
         os.close(running.hold())
         job.communicate(b"\n")
-
-
-@pytest.mark.parametrize(
-    ("action", "advice"),
-    [("suspend", "it is stopped: kill -CONT {0} continues it, kill -KILL {0}"), ("resume", "wait")],
-)
-def test_the_second_process_says_what_to_do_about_the_first(other, action, advice):
-    process = psutil.Process(other.pid)
-    getattr(process, action)()
-    while action == "suspend" and process.status() != psutil.STATUS_STOPPED:
-        time.sleep(0.01)
-    with pytest.raises(PdromError, match=f"; {advice.format(other.pid)}"):
-        running.hold()
 
 
 def test_what_stands_in_place_of_a_lock_is_named_or_goes(folder):
