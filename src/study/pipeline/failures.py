@@ -6,12 +6,13 @@ import signal
 import sys
 import threading
 from pathlib import Path
+from typing import NoReturn
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
 from pdrom.core.errors import PdromError
 from study.pipeline.fork_server.client import GONE
-from study.pipeline.signals import KEPT, ending
+from study.pipeline.signals import KEPT, ending, handle
 
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (.*)$", re.MULTILINE)
 _ENDING = re.compile(r"died with <Signals\.\w+: (\d+)|exit status (\d+)")
@@ -54,9 +55,11 @@ class Failures(logging.Handler):
                 made = f"job {record.rule_name} failed while making {record.output[0]}"
                 self._lines.append(f"{made}: {cause(said or record.rule_msg or '')} (log: {log})")
 
-    def note(self, number: int) -> None:
-        """Store that the run ends because it received the signal ``number``."""
+    def interrupt(self, number: int, _frame: object = None) -> NoReturn:
+        """Handler of the signal ``number``: let Snakemake cancel its jobs and end the run."""
+        handle(signal.SIG_IGN)
         self._stopped = number
+        raise KeyboardInterrupt
 
     def end(self) -> tuple[str, int]:
         """Return the last lines of a failed run, with each failed job's error, and exit status."""

@@ -20,7 +20,7 @@ from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, remember
 from study.pipeline.failures import Failures
 from study.pipeline.fingerprint import memory
-from study.pipeline.fork_server import start_server
+from study.pipeline.fork_server import SUPPORTED, start_server
 from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
 from study.pipeline.progress import Preview
@@ -65,7 +65,7 @@ class Run:
     def __init__(self) -> None:
         """Lock the working directory, or end the process if it is locked; not if no job runs."""
         handle(leave)
-        JobScheduler.exit_gracefully = staticmethod(leave)  # until jobs start
+        JobScheduler.exit_gracefully = staticmethod(leave)
         with one_line():
             self.command = CommandLine(sys.argv[1:])
             if not self.command.looks_only:
@@ -110,7 +110,8 @@ class Run:
         os.environ[planned.KEPT] = str(planned.PLAN.absolute())
         if workflow.local_exec:
             start_server()
-        handle(running.stop(self.failures.note))
+        if not (workflow.local_exec and SUPPORTED):  # else the server ends all jobs with this run
+            handle(self.failures.interrupt)
 
     def succeed(self, plan: Plan) -> None:
         """End a successful run: write overview and manifest; print the summary as last output."""

@@ -19,7 +19,7 @@ ENDINGS = {
 
 
 def leave(number: int, _frame: object = None) -> NoReturn:
-    """Handler of the signal ``number`` while no job runs: end this process with one line."""
+    """Handler of the signal ``number``: end this process with one line, and so the fork server."""
     with suppress(OSError):  # nobody may read the stream any more; sys.stderr may be redirected
         os.write(2, ending(number).encode())
     os._exit(128 + number)

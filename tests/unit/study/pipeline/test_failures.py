@@ -1,6 +1,7 @@
 """The last lines of a failed run name each failed job, its file and the cause."""
 
 import logging
+import signal
 
 import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
@@ -70,7 +71,11 @@ def test_a_failed_batch_is_named_with_the_last_line_of_its_log(tmp_path):
 def test_a_run_that_a_signal_ended_names_no_failed_job(number):
     failures = Failures()
     fail(failures, "fom", "none.log", ENDED + "returned non-zero exit status 1.")
-    failures.note(number)
+    before = [signal.getsignal(each) for each in ENDINGS]
+    with pytest.raises(KeyboardInterrupt):
+        failures.interrupt(number)
+    for each, handler in zip(ENDINGS, before, strict=True):
+        signal.signal(each, handler)
     text, status = failures.end()
     assert status == 128 + number
     assert text.startswith(f"pdrom: {ENDINGS[number]}; ")

@@ -79,36 +79,6 @@ def test_what_stands_in_place_of_a_lock_is_named_or_goes(folder):
     assert not running.SNAKEMAKE_LOCKS.exists()
 
 
-# A run with a job in a shell, as Snakemake waits for it; it prints how the job ended.
-RUNS = """
-import os, subprocess, sys
-from study.pipeline import running
-from study.pipeline.signals import handle
-running.PATIENCE = float(sys.argv[1])
-handle(running.stop(lambda number: os.write(1, b"noted %d\\n" % number)))
-job = subprocess.Popen(["sh", "-c", sys.argv[2]], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-ready = job.stdout.readline()
-try:
-    os.write(1, ready)
-    job.wait()
-except KeyboardInterrupt:
-    print(job.wait(), flush=True)
-"""
-
-
-@pytest.mark.parametrize("number", ENDINGS)
-@pytest.mark.parametrize(
-    ("patience", "job", "ending"),
-    [
-        ("1e6", "echo ready; read nothing", -signal.SIGTERM),
-        ("0", "trap '' TERM; echo ready; read nothing", -signal.SIGKILL),
-    ],
-    ids=["ends by it", "does not listen"],
-)
-def test_a_run_that_a_signal_ends_ends_its_jobs(patience, job, ending, number):
-    assert signalled(number, RUNS, patience, job) == (0, f"noted {number}\n{ending:d}\n", "")
-
-
 LEAVES = """
 import os
 from study.pipeline.signals import *
@@ -119,7 +89,7 @@ os.write(1, b'ready\\n')
 
 @pytest.mark.parametrize("number", ENDINGS)
 @pytest.mark.parametrize("ignores", [False, True])
-def test_while_no_job_runs_a_signal_ends_a_run_with_one_line(number, ignores):
+def test_a_signal_ends_a_run_with_one_line(number, ignores):
     """Though sys.stderr is redirected; what nohup ignores stays ignored."""
     code = "import sys\nsys.stderr = None\n" + LEAVES + "sys.stdin.read()"
     if ignores:
