@@ -27,6 +27,8 @@ _SIGNS = {
     "ϑ": r"\vartheta", "ϕ": r"\phi", "ϱ": r"\varrho", "ϵ": r"\epsilon", "ς": r"\varsigma",
     "σ": r"\sigma", "φ": r"\varphi", "ε": r"\varepsilon", "ο": "o",
 }  # fmt: skip
+_GREEK = """alpha beta gamma delta zeta eta theta iota kappa lambda mu nu xi pi rho tau upsilon chi
+psi omega sigma phi"""
 # TeX has no commands for capital Greek letters that look like Latin ones.
 _LATIN_CAPITALS = dict(zip("ΑΒΕΖΗΙΚΜΝΟΡΤΧ", "ABEZHIKMNOPTX", strict=True))
 
@@ -83,14 +85,10 @@ def _typeset(character: str) -> str | None:
 
 def _greek(character: str) -> str | None:
     """TeX command of a Greek letter without accents; None for any other ``character``."""
-    words = unicodedata.name(character, "").split()
-    if len(words) != 4 or words[0] != "GREEK" or words[2] != "LETTER":
+    words = unicodedata.name(character, "").lower().replace("lamda", "lambda").split()
+    if len(words) != 4 or words[::2] != ["greek", "letter"] or words[3] not in _GREEK.split():
         return None
-    name = words[3].lower().replace("lamda", "lambda")  # Unicode's spelling -> TeX's
-    known = "alpha beta gamma delta zeta eta theta iota kappa lambda mu nu xi pi rho tau upsilon chi psi omega sigma phi"  # noqa: E501
-    if name not in known.split():
-        return None
-    return "\\" + (name.capitalize() if words[1] == "CAPITAL" else name)
+    return "\\" + (words[3].capitalize() if words[1] == "capital" else words[3])
 
 
 def _shown(text: str) -> str:

@@ -16,7 +16,7 @@ HANDED_ON = {
     "test": (sys.executable, "-m", "pytest"),
     "verify": (sys.executable, "-m", "study.verification.command"),
     "bundle": (sys.executable, "-m", "study.verification.bundle"),
-    "run": (),
+    "run": ("env",),
 }
 
 
@@ -29,12 +29,7 @@ def main() -> None:
     settle()
     if sys.argv[1:] and sys.argv[1] in HANDED_ON:
         command = [*HANDED_ON[sys.argv[1]], *sys.argv[2:]]
-        if not command:
-            sys.exit("pdrom: run: no program is named, as in: ./reproduce run pdrom --help")
-        try:
-            os.execvp(command[0], command)
-        except OSError as error:
-            sys.exit(f"pdrom: run: {command[0]}: {error.strerror}")
+        os.execvp(command[0], command)
     sys.stderr.write("reproduce: planning\n")
     from logging import getLogger
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from pdrom.core.errors import ConfigurationError, SceneError, choices
 from pdrom.core.provenance import ORIGIN, provenance
-from pdrom.reduction.subspace.exported import DOUBLES, LARGEST, require_known
+from pdrom.reduction.subspace.exported import require_known
 from study.article.build import article
 from study.artifact.artifact import Artifact, make, modules_in, recorded
 from study.artifact.logs import warnings_to
@@ -61,26 +61,12 @@ def check_subspaces(study: Study) -> None:
 
 
 def check_live(study: Study) -> None:
-    """Raise ConfigurationError if the live web page could not load or run the models of a scene."""
-    settings = study.settings
+    """Raise ConfigurationError if the live web page cannot run the models of a scene."""
     for name in (labels["scene"] for labels in labels_of(study, LIVE_MODEL)):
         try:
             require_known(study.scene(name))
         except SceneError as error:
             raise ConfigurationError(f"live.scenes: {error}") from error
-        # least bytes of the scene's web file, in base 64: points, masses, k + 4 columns per basis
-        vertices = study.sizes[name][0]
-        section = settings.subspace if name in study.scenes else settings.online
-        sizes = [k for k in settings.live.sizes if k in section.sizes and "pod" in section.bases]
-        entries = [vertices * (k + 4) for k in sizes]
-        bases = sum(count * (8 if count <= DOUBLES else 4) for count in entries)
-        size = (vertices * 32 + bases) * 4 / 3
-        if size > LARGEST:
-            raise ConfigurationError(
-                f"live.scenes: scene '{name}' takes at least {size / 1e6:.1f} MB of models on "
-                f"{vertices} vertices, allowed are {LARGEST / 1e6:.1f}: choose fewer modes "
-                f"(live.sizes = {list(settings.live.sizes)})"
-            )
 
 
 def check_texts(study: Study) -> None:

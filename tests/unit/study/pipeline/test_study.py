@@ -121,7 +121,6 @@ def test_where_a_subspace_is_asked_for_the_scene_is_refused(root, key, scenes):
     [
         ({"anderson_window": 3}, "anderson_window = 3: the page's engine has no acceleration"),
         ({"effects": [{"effect": "bending", "weight": 1.0}], "reduce": {}}, "has no 'bending'"),
-        ({"mesh": {"kind": "cloth", "rows": 150, "columns": 150}}, r"7.9 MB .* allowed are 3.0"),
     ],
 )
 def test_a_scene_that_the_page_cannot_hold_is_refused_by_the_plan(root, changes, words):
