@@ -16,10 +16,10 @@ from pathlib import Path
 import psutil
 import pytest
 from checkout import only_line, write_sheet
-from sandbox import MICRO_FILE, Sandbox, kill_all, wait_for
+from sandbox import Sandbox, kill_all, wait_for
 
 from pdrom.core.store import checksum_path
-from places import MICRO_MANUSCRIPT, MICRO_RESULTS
+from places import MICRO_RESULTS
 from study.pipeline.signals import ENDINGS, KEPT
 
 TABLE = f"{MICRO_RESULTS}/tables/reconstruction_error.csv"
@@ -47,14 +47,6 @@ def sandbox(undisturbed: Sandbox, tmp_path: Path) -> Sandbox:
 @pytest.fixture
 def fresh(tmp_path: Path) -> Sandbox:
     return Sandbox.make(tmp_path / "run")
-
-
-@pytest.fixture(scope="module")
-def finished_study(tmp_path_factory: pytest.TempPathFactory) -> Sandbox:
-    """The whole micro study with its manuscript."""
-    sandbox = Sandbox.make(tmp_path_factory.mktemp("study") / "run")
-    sandbox.finish()
-    return sandbox
 
 
 def last_lines(output: str, count: int = 2) -> str:
@@ -86,29 +78,6 @@ def test_lost_rows_and_a_killed_job_are_named_and_made_again(undisturbed, sandbo
     assert expected in last_lines(output)
     assert not sandbox.path(TABLE).exists()
     heals(sandbox, undisturbed)
-
-
-# rule -> an output of it, of each kind of file
-RULES = {
-    "mesh": f"{MICRO_RESULTS}/meshes/*.h5",
-    "reruns": f"{MICRO_RESULTS}/reruns/spring_oop/spring/block-deim_heldout.csv",
-    "figure_singular_values": f"{MICRO_RESULTS}/figures/singular_values.png",
-    "paper_inputs": f"{MICRO_RESULTS}/paper/main.bbl",
-    "paper": MICRO_MANUSCRIPT,
-}
-
-
-@slow
-@pytest.mark.parametrize("rule", RULES)
-def test_a_job_that_is_killed_in_any_rule(rule, finished_study, tmp_path):
-    sandbox = finished_study.copy(tmp_path / "run")
-    (output,) = sandbox.folder.glob(RULES[rule])
-    target = str(output.relative_to(sandbox.folder))
-    output.unlink()
-    status, said = sandbox.run(target, fault=f"kill:/\\.{re.escape(output.stem)}\\.[0-9a-f]{{16}}")
-    assert status != 0
-    assert re.search(rf"job {rule} failed while making \S+: ended by SIGKILL", last_lines(said))
-    heals(sandbox, finished_study, target)
 
 
 @slow
@@ -244,31 +213,6 @@ def test_unfit_results_are_named_by_the_plan_and_made_again(undisturbed, sandbox
     heals(sandbox, undisturbed)
     planned = sandbox.start("-n", "--", TABLE).communicate(timeout=600)[0]
     assert "Nothing to be done" in planned
-
-
-@slow
-@pytest.mark.parametrize(
-    ("name", "damage"),  # every kind of damage: test_checksum.py, test_unfit.py
-    [
-        (f"{MICRO_RESULTS}/reruns/spring_oop/spring/block-deim.csv", Path.unlink),
-        (f"{MICRO_RESULTS}/tables/claims.csv", cut),
-        (f"{MICRO_RESULTS}/figures/singular_values.pdf", cut),
-    ],
-)
-def test_a_damaged_result(name, damage, finished_study, tmp_path):
-    """`verify --files` names the file alone before the next run, and none afterwards."""
-    sandbox = finished_study.copy(tmp_path / "run")
-    damage(sandbox.path(name))
-    assert unfit(sandbox) == [name]
-    sandbox.finish()
-    assert unfit(sandbox) == []
-
-
-def unfit(sandbox: Sandbox) -> list[str]:
-    """Files that `verify --files` names, with their faults."""
-    command = ("./reproduce", "verify", "--files", "--configfile", MICRO_FILE)
-    done = subprocess.run(command, cwd=sandbox.folder, capture_output=True, text=True, check=False)
-    return [line.split(": ")[0] for line in done.stdout.splitlines() if ": " in line]
 
 
 def run_while_all_code_is_edited(sandbox: Sandbox, *targets: str) -> None:

@@ -126,20 +126,6 @@ def test_the_plan_names_the_damaged_file_and_its_reader_sets_it_aside(damage, pl
         jobs[SNAPSHOT].make(jobs[SNAPSHOT].outputs)
 
 
-def test_a_table_is_checked_with_the_checksum_beside_it(plan):
-    """Another table with its checksum file is damaged: the checksum has its name."""
-    content, checksum = Path(ROWS).read_bytes(), checksum_path(Path(ROWS)).read_bytes()
-    for damage, (do, fault) in DAMAGES.items():
-        do(Path(ROWS))
-        assert (damage, unfit(plan)) == (damage, {ROWS: DAMAGED if fault == FOREIGN else fault})
-        if Path(ROWS).is_dir():
-            Path(ROWS).rmdir()
-        Path(ROWS).unlink(missing_ok=True)
-        Path(ROWS).write_bytes(content)
-        checksum_path(Path(ROWS)).write_bytes(checksum)
-    assert unfit(plan) == {}
-
-
 def test_another_run_of_one_job_older_code_and_other_inputs_are_noticed(plan):
     """Each file has a valid checksum that tells where it comes from."""
     heldout = HELDOUT.at(RESULTS, scene=SCENE)
