@@ -122,7 +122,7 @@ class Comparison:
         if self.table.timed_cells is None:
             return [()] * len(self.e)
         reads = self.table.reads.items()
-        files = {name: Path(r.path) for name, r in reads if isinstance(r, ProjectFile)}
+        files = {name: r.content(r.path) for name, r in reads if isinstance(r, ProjectFile)}
         return self.table.timed_cells(self.e, **files)
 
     def unstable(self, column: Column) -> np.ndarray:
