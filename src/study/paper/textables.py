@@ -243,13 +243,14 @@ def payoff(payoff: pd.DataFrame) -> Rows:
 
 
 def pays(winners: pd.DataFrame) -> Rows:
-    """Numbers of vertices from which on a reduction is faster than full order, by error limit."""
-    header = ["scene", "against", "error", "vertices", "plain", "all", "speed-up", "motions"]
-    yield "lllrrrrr", header
+    """Vertices from which on a reduction is faster; of positions only if both errors differ."""
+    header = ["scene", "against", "error", "measure", "vertices", "plain", "all", "speed-up"]
+    yield "llllrrrrr", [*header, "motions"]
+    before: list[list[str]] = []
     for _, curve in winners.groupby(CURVE, sort=False):
         row, smallest, largest = curve.iloc[0], curve.vertices.min(), curve.vertices.max()
         stiffness = "" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"
-        yield [
+        cells = [
             _name(row.scene) + stiffness + ("*" if curve.recorded.notna().any() else ""),
             row.reference,
             format_number(row.limit),
@@ -261,20 +262,23 @@ def pays(winners: pd.DataFrame) -> Rows:
             else in_words(row.speedup, row.speedup_low, row.speedup_high),
             f"{_known(row.reached, _whole)} of {row.motions}",
         ]
+        if cells not in before:
+            yield [*cells[:3], row.measure, *cells[3:]]
+        before.append(cells)
 
 
 def training(alternatives: pd.DataFrame) -> Rows:
     """Errors of the reduction with Anderson acceleration, by the number of its training motions.
 
-    For the smallest and largest number, the table also has the time of training, and the error of
-    the mass-orthogonal projection of the full-order motion onto the subspace.
+    For the smallest and largest number, the table also has the time of training over that of a
+    plain frame, and the error of the mass-orthogonal projection of the motion onto the subspace.
     """
     reduced = alternatives[alternatives.method == ACCELERATED]
     reduced = reduced[reduced.iterations == reduced.iterations.max()]
     played = alternatives[alternatives.method == PLAYBACK].set_index(CASE).error_implicit
     counts = sorted(reduced.training_motions.unique())
     header = ["scene", "vertices", "motion", "playback", *map(_whole, counts)]
-    header += ["nearest: least", "most", "training (s): least", "most"]
+    header += ["nearest: least", "most", "training (frames): least", "most"]
     yield "lrl" + "r" * (5 + len(counts)), header
     for case, own in reduced.groupby(CASE, sort=False):
         own = own[own.k == own.k.max()].set_index("training_motions").sort_index()
@@ -282,7 +286,7 @@ def training(alternatives: pd.DataFrame) -> Rows:
         stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
         ends = own.iloc[[0, -1]]
         numbers = [played[case], *own.error_implicit.reindex(counts), *ends.span_error]
-        numbers += [*ends.offline_s]
+        numbers += [*ends.offline_ratio]
         yield [_name(scene) + stiff, str(vertices), motion, *map(_known, numbers)]
 
 

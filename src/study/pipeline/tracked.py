@@ -6,9 +6,11 @@ costs : `config/reference/job_costs.csv` from the logs of the full and of the ti
     kind of job, the mean processor seconds in both, and the longest time and largest memory, which
     the requests of `workflow/profiles/slurm` must cover
 replication : the file of the table `replication` from the claims of ``config/replication.yaml``
-rows : tables of the long study ``config/extended.yaml`` whose rows other studies show, too
+rows : tables of the long study ``config/extended.yaml`` whose rows other studies show, too; this
+    word runs that part of the long study first, and says how long its jobs took the last time
 """
 
+import subprocess
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,17 +20,25 @@ import pandas as pd
 
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.store import atomic_path, read_table
+from pdrom.core.yamlfile import read_yaml
 from study.artifact.logs import usage_of
 from study.artifact.paths import TABLE
 from study.artifact.reads import RECORD
+from study.experiments.alternatives.experiment import alternatives
 from study.pipeline.commandline import one_line
+from study.pipeline.fingerprint import fingerprint
 from study.pipeline.folders import folders
+from study.pipeline.scenes import read_scene
+from study.pipeline.summary import minutes
+from study.tables import declared
 from study.tables.claims.claims import MEASURED, RECORDED, RULES
 from study.tables.claims.rules import load_claims
+from study.tables.kit.results import recordable
 
 COSTS = Path("config/reference/job_costs.csv")
 COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]
 KEPT = ("alternatives", "winners")
+LONG, MADE = "config/extended.yaml", Path("config/reference/recorded/made.csv")
 
 
 def write_tracked(path: Path, content: bytes) -> None:
@@ -71,6 +81,21 @@ def dated(path: Path, column: str) -> pd.DataFrame:
     return read_table(path).assign(**{column: day})
 
 
+def code_of_rows() -> str:
+    """Fingerprint of the code on which jobs of `KEPT` depend in the long study `LONG`."""
+    scenes = read_yaml(Path(LONG))[alternatives.name]["scenes"]
+    effects = {place for name in scenes for place in read_scene(Path(), name).modules}
+    return fingerprint(alternatives.function.__module__, *sorted(effects))[:16]
+
+
+def outdated_rows() -> str | None:
+    """Return a warning if the code is newer than the recorded rows of `KEPT`, else None."""
+    made = pd.read_csv(MADE, dtype=str).iloc[0]
+    again = f"./reproduce run python -m study.pipeline.tracked rows (last time {made.took})"
+    warning = f"warning: {MADE.parent}: the code is newer than these rows; make them by {again}"
+    return None if made.code == code_of_rows() else warning
+
+
 def updated(word: str) -> dict[Path, pd.DataFrame]:
     """Map files to their new content, for "costs", "replication" or "rows"."""
     study, tiny, replication, extended = (
@@ -84,13 +109,22 @@ def updated(word: str) -> dict[Path, pd.DataFrame]:
             claims = Path(TABLE.at(replication, name="claims"))
             return {Path(RECORDED): recorded_verdicts(claims, Path(RULES))}
         case "rows":
-            tables = {name: Path(TABLE.at(extended, name=name)) for name in KEPT}
-            return {Path(RECORD.format(n)): dated(t, "recorded") for n, t in tables.items()}
+            tables = {n: dated(Path(TABLE.at(extended, name=n)), "recorded") for n in KEPT}
+            used = map(usage_of, Path(extended, "logs", alternatives.name).rglob("*.log"))
+            made = {"code": [code_of_rows()], "took": [minutes(sum(u.wall for u in used if u))]}
+            columns = {n: recordable(declared()[n].columns) for n in KEPT}
+            rows = {Path(RECORD.format(n)): t[columns[n]] for n, t in tables.items()}
+            return rows | {MADE: pd.DataFrame(made)}
     known = choices(word, ["costs", "replication", "rows"])
     raise ConfigurationError(f"tracked: '{word}': unknown{known}")
 
 
 if __name__ == "__main__":
     with one_line():
-        for path, table in updated(" ".join(sys.argv[1:])).items():
+        if (word := " ".join(sys.argv[1:])) == "rows":
+            sys.stderr.write(f"reproduce: last time this took {pd.read_csv(MADE).took[0]}\n")
+            files = [TABLE.at(folders([LONG], []).results, name=name) for name in KEPT]
+            if ended := subprocess.call(["./reproduce", "--configfile", LONG, "--", *files]):
+                sys.exit(ended)
+        for path, table in updated(word).items():
             write_tracked(path, table.to_csv(index=False).encode())

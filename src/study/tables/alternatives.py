@@ -6,6 +6,8 @@ reductions win.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,26 +17,33 @@ from pdrom.model.held_out import MOTIONS, PLAYBACK
 from study.artifact import paths
 from study.artifact.reads import Every, Recorded, Setting, TableOf
 from study.experiments.alternatives import experiment as settings
+from study.tables.kit import results
 from study.tables.kit.declaration import flag, integer, interval, number, shared, table, text, timed
-from study.tables.kit.results import DAY, joined, median_interval, with_recorded
 
 STIFFNESS = number("stiffness", "factor on all weights of the scene", compared="exact")
+RATIO = "time of a frame over that of plain projective dynamics with ten iterations"
 SUBSTEPS = integer("substeps", "steps that a frame is divided into")
 ITERATIONS = integer("iterations", "iterations of each substep")
 
 MOTION = text("motion", f"held-out motion, one of: {', '.join(MOTIONS)}")
 # Columns that identify a candidate (a solver with its settings); its rows differ in the motion.
-CANDIDATE = ["scene", "factor", "stiffness", *settings.SETTING]
+MESH = ["scene", "factor", "stiffness"]
+CANDIDATE = [*MESH, *settings.SETTING]
 
 # Relative difference of errors that is allowed between machines: rounding errors decide which steps
 # the two-level methods reject.
 ERROR_TOLERANCE = 0.3
-REFERENCES = ("implicit", "continuous")
+estimated = partial(replace, *shared("reference_error"))  # column of errors of a reference
 CASE = ["scene", "vertices", "stiffness", "motion"]
-SPEEDUP = ("reduced_speedup", "reduced_speedup_low", "reduced_speedup_high")
-CURVE = ["scene", "stiffness", "reference", "limit"]
-PLAIN = "projective"
-KNOWN = 3.0  # least limit of errors / error of the reference run "continuous"
+CURVE = ["scene", "stiffness", "reference", "measure", "limit"]
+PLAIN, TEN = "projective", 10  # method and iterations that times are compared with
+# Reference, measure, columns of the errors that are limited, the same errors of the reference.
+MEASURES = (
+    ("implicit", results.BOTH, ["error_implicit", "deformation_error"],
+     ["implicit_error", "implicit_deformation_error"]),
+    ("implicit", results.POSITION, ["error_implicit"], ["implicit_error"]),
+    ("continuous", results.POSITION, ["error_continuous"], ["reference_error"]),
+)  # fmt: skip
 
 
 @table(
@@ -59,12 +68,18 @@ KNOWN = 3.0  # least limit of errors / error of the reference run "continuous"
         integer("frames", "frames that errors are taken over"),
         flag("finite", "no frame blew up", compared="error"),
         *shared("ms_per_frame vertices_ms"),
+        timed(number("time_ratio", RATIO)),
+        timed(number("vertices_ratio", "of it, the positions of all vertices")),
+        timed(number("offline_ratio", "time of its training over that of one plain frame")),
         integer("processes", "processes that timed it, all in the first motion"),
         number("error_implicit", "against the converged step", tolerance=ERROR_TOLERANCE),
+        number("deformation_error", "of the shapes, the same", tolerance=ERROR_TOLERANCE),
         number("error_continuous", "against continuous time: the total", tolerance=ERROR_TOLERANCE),
-        replace(*shared("reference_error"), meaning="estimated error of that motion"),
+        estimated(meaning="estimated error of that motion"),
+        estimated(name="implicit_error", meaning="of the converged step, by a much finer solve"),
+        estimated(name="implicit_deformation_error", meaning="of its shapes"),
         number("span_error", "error of the nearest motion in the subspace of a reduction"),
-        DAY,
+        results.DAY,
     ),
     reads={
         "parts": Every(paths.ALTERNATIVES),
@@ -79,12 +94,18 @@ def alternatives(
 
     Times are medians over all timing processes. `with_recorded` appends rows of ``record``.
     """
-    rows = joined(parts)
+    rows = results.joined(parts)
     if len(rows):
-        rows, processes = beside(rows, joined(times))
+        rows, processes = beside(rows, results.joined(times))
         ms = rows[processes]
         rows = rows.assign(ms_per_frame=ms.median(axis=1), processes=ms.count(axis=1))
-    return with_recorded(rows, record)
+        own = (rows.method == PLAIN) & (rows.substeps == 1) & (rows.iterations == TEN)
+        plain = ms[own].reindex(ms.index).groupby([rows[key] for key in MESH]).transform("max")
+        rows["time_ratio"] = (ms / plain).median(axis=1)
+        per_ms = rows.time_ratio / rows.ms_per_frame
+        rows["vertices_ratio"] = per_ms * rows.vertices_ms
+        rows["offline_ratio"] = 1e3 * per_ms * rows.offline_s
+    return results.with_recorded(rows, record, alternatives.columns)
 
 
 def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[int]]:
@@ -103,18 +124,17 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
         STIFFNESS,
         MOTION,
         text("reference", "what the error is taken against: implicit or continuous"),
+        results.MEASURE,
         number("limit", "error that is allowed", compared="exact"),
         timed(text("method", "the fastest full-order method within the limit; no reduction")),
         timed(SUBSTEPS),
         timed(ITERATIONS),
-        timed(number("error", "error that it has")),
-        *shared("ms_per_frame"),
-        timed(text("second", "the next best of the other full-order methods")),
-        timed(number("margin", "time of the second over that of the first")),
-        timed(number("plain_ms", "time of one-step projective dynamics, if it reaches it", "ms")),
+        timed(number("error", "error that it has, the larger one of both")),
+        timed(number("time_ratio", RATIO)),
         timed(number("reduced_error", "smallest error of the reduction")),
-        timed(number("reduced_ms", "time of a frame of the reduction, if it reaches it", "ms")),
-        timed(number("reduced_vertices_ms", "of it, the positions of all vertices", "ms")),
+        timed(number("reduced_time_ratio", "the same of the reduction, if it reaches it")),
+        timed(number("reduced_vertices_ratio", "of it, the positions of all vertices")),
+        timed(number("plain_speedup", "time of one-step projective dynamics over it, if both do")),
         timed(number("reduced_speedup", "time of the best full order over that of the reduction")),
         *map(timed, interval("reduced_speedup_low reduced_speedup_high")),
         timed(text("reduced_method", "the reduction that is the fastest to reach it")),
@@ -128,7 +148,7 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
         timed(number("speedup", "median of reduced_speedup over the motions that reach it")),
         timed(number("speedup_low", "least 2.5 % quantile of a motion")),
         timed(number("speedup_high", "largest 97.5 % quantile of a motion")),
-        DAY,
+        results.DAY,
     ),
     reads={
         "rows": TableOf("alternatives"),
@@ -140,24 +160,22 @@ def beside(rows: pd.DataFrame, times: pd.DataFrame) -> tuple[pd.DataFrame, list[
 def winners(
     rows: pd.DataFrame, times: list[paths.File], limits: Sequence[float], record: list[Path]
 ) -> pd.DataFrame:
-    """One row per scene, mesh, stiffness, motion, reference and error limit.
+    """One row per scene, mesh, stiffness, motion, reference, measure and error limit.
 
-    Column ``method`` is empty if no full-order method that was timed reaches the limit. Rows of the
-    reference "continuous" have only limits of at least `KNOWN` times this reference's own error.
+    Column ``method`` is empty if no full-order method that was timed reaches the limit. Limits are
+    at least three times the reference's own error. In a rigid motion, the position decides.
     """
     found = []
     rows = rows[rows.recorded.isna()]
     if len(rows):
-        rows, processes = beside(rows, joined(times))
+        rows, processes = beside(rows, results.joined(times))
     for labels, case in rows.groupby(CASE, sort=False):
         named = dict(zip(CASE, labels, strict=True))
-        for reference in REFERENCES:
-            timed_rows = case[case.ms_per_frame.notna()]
-            known = timed_rows.assign(error=timed_rows[f"error_{reference}"])
-            for limit in limits:
-                if reference == "continuous" and not KNOWN * case.reference_error.max() <= limit:
-                    continue
-                row = {**named, "reference": reference, "limit": limit}
+        timed_rows = case[case.ms_per_frame.notna()]
+        for limit, (reference, measure, errors, own) in product(limits, MEASURES):
+            if case[own].max().max() <= results.THIRD * limit:
+                known = timed_rows.assign(error=timed_rows[errors].max(axis=1))
+                row = {**named, "reference": reference, "measure": measure, "limit": limit}
                 found.append({**row, **_best(known, limit, processes)})
     made = pd.DataFrame(found, columns=winners.column_names)
     if len(made):
@@ -165,54 +183,44 @@ def winners(
         pays = [{**dict(zip(CURVE, k, strict=True)), **_pays(own)} for k, own in curves]
         rest = made.columns.difference([name for name in pays[0] if name not in CURVE])
         made = made[rest].merge(pd.DataFrame(pays), on=CURVE, how="left")
-    return with_recorded(made, record)
+    return results.with_recorded(made, record, winners.columns)
 
 
 def _best(rows: pd.DataFrame, limit: float, processes: list[int]) -> dict[str, object]:
-    """Columns about the two fastest full-order methods and the fastest reduction within ``limit``.
+    """Columns about the fastest full-order method and the fastest reduction within ``limit``.
 
     A speed-up is a median over ``processes`` (columns of times) of full-order / reduced time.
     """
+    inside = rows.method.isin(settings.REDUCTIONS)
+    made: dict[str, object] = {"reduced_error": rows.error[inside].min()}
     reaching = rows[rows.error <= limit].sort_values("ms_per_frame", kind="stable")
-    inside = reaching.method.isin(settings.REDUCTIONS)
-    full, reduced = reaching[~inside], reaching[inside]
-    made: dict[str, object] = {
-        "reduced_error": rows.error[rows.method.isin(settings.REDUCTIONS)].min()
-    }
-    plain = reaching[(reaching.method == PLAIN) & (reaching.substeps == 1)]
-    if len(plain):
-        made["plain_ms"] = plain.ms_per_frame.iloc[0]
+    full, reduced = reaching[~inside[reaching.index]], reaching[inside[reaching.index]]
+    plain = full[(full.method == PLAIN) & (full.substeps == 1)]
     if len(reduced):
         first = reduced.iloc[0]
-        same = ("method", "training_motions", "iterations", "vertices_ms")
+        same = ("method", "training_motions", "iterations", "time_ratio", "vertices_ratio")
         made |= {f"reduced_{key}": first[key] for key in same}
-        made["reduced_ms"] = first.ms_per_frame
+        made["plain_speedup"] = plain.ms_per_frame.min() / first.ms_per_frame
     if len(full):
         best = full.iloc[0]
-        made |= best[["method", "substeps", "iterations", "error", "ms_per_frame"]].to_dict()
+        made |= best[["method", "substeps", "iterations", "error", "time_ratio"]].to_dict()
         if len(reduced):
             ratios = (best[processes] / first[processes]).astype(float).dropna()
-            made |= zip(SPEEDUP, median_interval(ratios), strict=True)
+            speedup = [f"reduced_speedup{end}" for end in ("", "_low", "_high")]
+            made |= zip(speedup, results.median_interval(ratios), strict=True)
             saved = best.ms_per_frame - first.ms_per_frame
             made["reduced_pays_after"] = 1e3 * first.offline_s / saved if saved > 0.0 else None
-        others = full[full.method != best.method]
-        if len(others):
-            second = others.iloc[0]
-            margin = second.ms_per_frame / best.ms_per_frame
-            made |= {"second": second.method, "margin": margin}
     return made
 
 
 def _pays(curve: pd.DataFrame) -> dict[str, object]:
     """Columns: mesh sizes from which on reductions are faster, speed-ups on the largest mesh."""
     # least speed-up of all motions on a mesh; NaN if a method misses the error limit in one motion
-    every = curve.assign(plain=curve.plain_ms / curve.reduced_ms)
-    worst = every.groupby("vertices")[["plain", "reduced_speedup"]].agg(
-        lambda speedups: speedups.min(skipna=False)
-    )
+    by_mesh = curve.groupby("vertices")[["plain_speedup", "reduced_speedup"]]
+    worst = by_mesh.agg(lambda speedups: speedups.min(skipna=False))
     sizes = worst.index.to_numpy(float)
     plain, best = worst.to_numpy(float).T
-    last = every[every.vertices == sizes[-1]]
+    last = curve[curve.vertices == sizes[-1]]
     return {
         "from_plain": _pays_from(sizes, plain),
         "from_best": _pays_from(sizes, best),

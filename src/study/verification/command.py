@@ -12,6 +12,7 @@ from pdrom.core.store import write_text
 from study.article.build import INDEX, write_verified
 from study.artifact.paths import ARTICLE, TABLE
 from study.pipeline.commandline import one_line
+from study.pipeline.tracked import outdated_rows
 from study.pipeline.unfit import faults
 from study.tables import declared
 from study.verification.examine import GOOD, Examination, Line, Outcome
@@ -86,6 +87,8 @@ def verify_tables(subject: Subject) -> Status:
     if pages.is_file():
         outcomes = (str(line).partition(": ") for line in lines)
         write_verified({name: outcome for name, _, outcome in outcomes}, pages.parent)
+    if subject.plan.study.settings.recorded and (warning := outdated_rows()):
+        say(warning)
     say(counted(lines))
     say(f"page: {written}")
     return status_of(lines)

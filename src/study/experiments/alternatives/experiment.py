@@ -24,6 +24,7 @@ from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.held_out import FIRST, MOTIONS, PLAYBACK
 from pdrom.model.runs import BLOWUP_EXTENT, BoundedRun, converged_run, trajectory
 from pdrom.model.scene import Scene, SceneConfig
+from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector, reduced_state
 from pdrom.reduction.subspace.training import make_columns, sampled_models
@@ -50,8 +51,6 @@ Work = Annotated[int, Field(ge=1, le=10**12, description="vertices times steps")
 Steps = Annotated[
     tuple[kit.Count, kit.Count], Field(description="substeps of a frame, iterations of each")
 ]
-
-
 Method = Literal[
     "projective", "anderson", "chebyshev", "explicit", "two-level", "ecsw", "ecsw-anderson"
 ]
@@ -61,8 +60,8 @@ Method = Literal[
 # first run, and halved until the estimated error is below `CONTINUOUS_TOLERANCE`.
 EXPLICIT_STEPS, CONTINUOUS_TOLERANCE = 40, 1e-4
 # Frames of training runs converge to this part of the mesh; projections are evaluated up to `MOST`
-# times in a frame, also of the implicit reference.
-TRAINING_TOLERANCE, MOST = 1e-5, 4000
+# times in a frame, also of the implicit reference, whose error a `FINER` times finer solve tells.
+TRAINING_TOLERANCE, MOST, FINER = 1e-5, 4000, 100.0
 # Sampling tolerances of reductions, and of the coarse level of the two-level method.
 TAU, COARSE_TAU = 1e-2, 5e-3
 
@@ -129,14 +128,13 @@ class Alternatives(Comparison):
     errors: tuple[kit.Tolerance, ...] = (1e-1, 1e-2, 1e-3)
 
 
-TIME_COLUMNS = [
-    "scene", "factor", "stiffness", *SETTING, "process", "ms_per_frame", "vertices_ms",
-]  # fmt: skip
+TIME_COLUMNS = ["scene", "factor", "stiffness", *SETTING, "process", "ms_per_frame", "vertices_ms"]
 log = logging.getLogger(__name__)
 COLUMNS = [
     "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations",
     "training_motions", "offline_s", "k", "elements_sampled", "training_residual", "motion",
-    "frames", "finite", "error_implicit", "error_continuous", "reference_error", "span_error",
+    "frames", "finite", "error_implicit", "deformation_error", "error_continuous", "span_error",
+    "reference_error", "implicit_error", "implicit_deformation_error",
 ]  # fmt: skip
 
 
@@ -198,9 +196,7 @@ def candidates(
     start, reduced = scene.initial_state(), []
     for method in settings.steps:
         for substeps, iterations in settings.pairs(method, scene.mesh.vertices):
-            labels: dict[str, object] = {
-                "method": method, "substeps": substeps, "iterations": iterations,
-            }  # fmt: skip
+            labels = dict[str, object](method=method, substeps=substeps, iterations=iterations)
             if method in TRAINED:
                 reduced.append((method, substeps, iterations, labels))
                 continue
@@ -382,15 +378,18 @@ def _rows(
         implicit = converged_run(scene, section.implicit.tolerance, MOST)
         if implicit is None:
             log.warning("%s: no convergence in %d evaluations", name, MOST)
-    against = {"error_implicit": implicit, "error_continuous": exact.positions}
+    common = {"vertices": vertices, "frames": frames, "reference_error": exact.error}
+    if implicit is not None:
+        yardstick = Yardstick(scene, implicit)
+        common |= _own_errors(scene, implicit, section.implicit.tolerance / FINER)
 
     def errors(run: np.ndarray | None) -> dict[str, float | None]:
-        return {
-            key: None if run is None or other is None else runfiles.run_error(run, other)
-            for key, other in against.items()
-        }
+        if run is None:
+            return {}
+        position, shape = (None, None) if implicit is None else yardstick.errors(run, frames)
+        total = runfiles.run_error(run, exact.positions)
+        return {"error_implicit": position, "deformation_error": shape, "error_continuous": total}
 
-    common = {"vertices": vertices, "frames": frames, "reference_error": exact.error}
     yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **errors(implicit)}
     yield {**common, "method": PLAYBACK, "substeps": 1, "finite": True, **errors(recorded)}
     spans: dict[int, float | None] = {}
@@ -406,3 +405,13 @@ def _rows(
                 spans[id(own)] = runfiles.run_error(nearest, implicit)
             row["span_error"] = spans[id(own)]
         yield row
+
+
+def _own_errors(scene: Scene, run: np.ndarray, tolerance: float) -> dict[str, Any]:
+    """Errors of the converged ``run`` against a finer one, on sheets from other starting points."""
+    finer = converged_run(scene, tolerance, MOST, from_last=not len(scene.mesh.tetrahedra))
+    if finer is None:
+        log.warning("%s: no convergence to %g in %d steps", scene.config.name, tolerance, MOST)
+        return {}
+    errors = Yardstick(scene, finer).errors(run, scene.config.frames)
+    return dict(zip(("implicit_error", "implicit_deformation_error"), errors, strict=True))

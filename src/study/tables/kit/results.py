@@ -16,7 +16,7 @@ import pandas as pd
 from pdrom.core.store import read_table
 from study.artifact.paths import File
 from study.experiments.kit.measurement import PHASES
-from study.tables.kit.declaration import integer, number, text
+from study.tables.kit.declaration import Column, integer, number, text
 
 RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # columns that identify a run
@@ -59,13 +59,21 @@ def joined(files: Iterable[File]) -> pd.DataFrame:
 DAY = text("recorded", "day on which config/extended.yaml recorded the row; empty: of this run")
 
 
-def with_recorded(rows: pd.DataFrame, record: list[Path]) -> pd.DataFrame:
-    """Append rows of file ``record``, if any, whose (scene, stiffness, vertices) ``rows`` lack."""
+def recordable(columns: Sequence[Column]) -> list[str]:
+    """Names of ``columns`` that rows of another machine may have: all but measured times."""
+    return [c.name for c in columns if not (c.timed and c.unit in ("ms", "s"))]
+
+
+def with_recorded(rows: pd.DataFrame, record: list[Path], known: Sequence[Column]) -> pd.DataFrame:
+    """Append rows of file ``record``, if any, whose (scene, stiffness, vertices) ``rows`` lack.
+
+    They have the `recordable` columns of those that are ``known``; the others are empty.
+    """
     if not record:
         return rows.assign(recorded=None)
-    others = read_table(record[0], result=False)
+    others = read_table(record[0], result=False).reindex(columns=recordable(known))
     if rows.empty:
-        return others
+        return others.reindex(columns=[column.name for column in known])
     keys = ["scene", "stiffness", "vertices"]
     own = pd.MultiIndex.from_frame(rows[keys].astype(object))
     others = others[~pd.MultiIndex.from_frame(others[keys].astype(object)).isin(own)]

@@ -14,10 +14,12 @@ from places import ROOT
 from study.artifact.logs import Usage
 from study.experiments.kit.base import experiments
 from study.experiments.machine import Units
+from study.pipeline import tracked
 from study.pipeline.run import expected_seconds
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
 from study.pipeline.tracked import COLUMNS, COSTS, measured_costs, recorded_verdicts, updated
+from study.tables import declared
 from study.tables.claims.claims import MEASURED, RECORDED, RULES, claims, replication
 from study.tables.claims.rules import load_claims
 
@@ -114,6 +116,23 @@ def test_the_profile_asks_for_more_than_any_measured_job_needed(kind, attempt):
 def verdicts(**columns: str) -> pd.DataFrame:
     made = pd.DataFrame({"claim": ["C1", "C5"], **dict.fromkeys(MEASURED, "holds"), **columns})
     return made.reindex(columns=claims.column_names)
+
+
+def test_recorded_rows_have_no_times_and_are_outdated_if_code_changes(tmp_path, monkeypatch):
+    (tmp_path / "config").symlink_to(ROOT / "config")
+    monkeypatch.chdir(tmp_path)
+    results = Path("results/studies/extended")
+    for name in tracked.KEPT:
+        row = {column: ["1"] for column in declared()[name].column_names}
+        write_table(pd.DataFrame(row), results / f"tables/{name}.csv")
+    say(results, "alternatives/s/x1.log", 1.0, wall=95.0)
+    made = updated("rows")
+    assert "ms_per_frame" not in made[Path("config/reference/recorded/alternatives.csv")]
+    made[tracked.MADE].to_csv("made.csv", index=False)
+    monkeypatch.setattr(tracked, "MADE", Path("made.csv"))
+    assert tracked.outdated_rows() is None
+    monkeypatch.setattr(tracked, "fingerprint", lambda *modules: "changed")
+    assert "tracked rows (last time 1 min 35 s)" in str(tracked.outdated_rows())
 
 
 def test_another_verdict_is_not_the_same(tmp_path: Path) -> None:
