@@ -6,8 +6,7 @@ costs : `config/reference/job_costs.csv` from the logs of the full and of the ti
     kind of job, the mean processor seconds in both, and the longest time and largest memory, which
     the requests of `workflow/profiles/slurm` must cover
 replication : the file of the table `replication` from the claims of ``config/replication.yaml``
-rows : tables of the long study ``config/extended.yaml`` whose rows other studies show, too; this
-    word runs that part of the long study first, and says how long its jobs took the last time
+rows : tables of ``config/extended.yaml`` that other studies show, too; makes them first
 """
 
 import subprocess

@@ -1,7 +1,6 @@
 """Errors and times of projective dynamics, of alternative solvers and of reductions.
 
-Table winners has the fastest full-order method for each allowed error, and mesh sizes where
-reductions win.
+Table winners names the fastest full-order method within an error, and where reductions win.
 """
 
 from collections.abc import Sequence

@@ -65,10 +65,7 @@ def recordable(columns: Sequence[Column]) -> list[str]:
 
 
 def with_recorded(rows: pd.DataFrame, record: list[Path], known: Sequence[Column]) -> pd.DataFrame:
-    """Append rows of file ``record``, if any, whose (scene, stiffness, vertices) ``rows`` lack.
-
-    They have the `recordable` columns of those that are ``known``; the others are empty.
-    """
+    """Append rows of ``record`` that ``rows`` lack, with the `recordable` of ``known`` columns."""
     if not record:
         return rows.assign(recorded=None)
     others = read_table(record[0], result=False).reindex(columns=recordable(known))
