@@ -139,8 +139,7 @@ def relative_deformation(difference: np.ndarray, deformed: np.ndarray, size: flo
     whole = float(np.linalg.norm(deformed))
     if not whole > RIGID * size * np.sqrt(len(deformed)):
         return None
-    with np.errstate(over="ignore"):
-        return float(np.linalg.norm(difference / whole))
+    return float(np.hypot.reduce(difference)) / whole  # as squares may overflow
 
 
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:
