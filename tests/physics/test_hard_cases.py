@@ -63,7 +63,7 @@ def energy_never_grows(case: HardCase, scene: Scene, run: Record) -> bool:
 
 def ends_in_its_rest_shape(case: HardCase, scene: Scene, run: Record) -> bool:
     """Up to a rigid motion, nearer than 1 % of the longest side of the mesh."""
-    residuals, scale = shape_residuals(scene.mesh.points[None], run.positions[-1:])
+    residuals, scale = shape_residuals(scene.mesh.points[None], run.positions[-1:], scene.masses)
     return scale[0] * np.linalg.norm(residuals, axis=2).max() <= 1e-2 * scene.mesh.extent
 
 

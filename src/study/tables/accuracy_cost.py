@@ -75,7 +75,7 @@ def accuracy_cost(
     known = trained(reruns).drop_duplicates("scene")[["scene", *OWN_ERRORS]]
     own, sweep = (full.merge(known, "left", "scene") for full in (own.assign(method="full"), sweep))
     parts = [part for part in (own, points, sweep) if len(part)]
-    points = pd.concat(parts, ignore_index=True)
+    points = pd.concat(parts or [points], ignore_index=True)
     for _, rows in points.groupby("scene", sort=False):
         points.loc[rows.index, "pareto"] = pareto(*rows[_POINT].to_numpy(float).T)
     order = points.scene.map({scene: i for i, scene in enumerate(iterations)})

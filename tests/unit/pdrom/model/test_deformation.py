@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pdrom.model.metrics import deformation, deformation_error
+from pdrom.model.metrics import affine_residuals, deformation_error, shape_differences
 
 
 @pytest.fixture
@@ -31,11 +31,12 @@ def test_the_best_rotation_is_no_worse_than_any_other(bent, rng):
     """Against the smallest of many rotations near the best one, with masses in every sum."""
     rest, shapes, masses = bent
     shape = shapes[:1]
-    found = deformation(rest, shape, masses)
+    (found,) = shape_differences(rest, shape, masses)
     a, b = (x - masses @ x / masses.sum() for x in (rest, shape[0]))
     best = Rotation.align_vectors(b, a, weights=masses)[0]
     tried = [best, *(Rotation.from_rotvec(0.01 * rng.standard_normal(3)) * best for _ in range(50))]
-    sums = [np.sqrt(np.sum(masses[:, None] * (r.apply(a) - b) ** 2)) for r in tried]
+    weights = masses[:, None] / masses.mean()
+    sums = [np.sqrt(np.sum(weights * (r.apply(a) - b) ** 2)) for r in tried]
     assert found == pytest.approx(sums[0], rel=1e-9)
     assert found <= min(sums) * (1 + 1e-9)
 
@@ -60,3 +61,17 @@ def test_a_rigid_reference_has_no_error_and_large_numbers_none_of_their_own(bent
         blown_up = deformation_error(1e200 * shapes, shapes, rest, masses)
     assert np.isfinite(blown_up)
     assert blown_up > 1e150
+
+
+@pytest.mark.parametrize("flat", [[1.0, 1.0, 1.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+def test_an_affine_image_leaves_nothing_and_another_run_what_least_squares_leave(bent, rng, flat):
+    rest, shapes, masses = bent
+    rest = rest * flat
+    image = rest @ rng.standard_normal((3, 3)) + [1.0, 2.0, 3.0]
+    assert affine_residuals(rest, np.stack([image, rest]), masses) == pytest.approx(0.0, abs=1e-12)
+    root = np.sqrt(masses / masses.mean())[:, None]
+    columns = root * np.c_[rest[:, np.array(flat) > 0.0], np.ones(30)]
+    left = [b - columns @ np.linalg.lstsq(columns, b)[0] for b in root * shapes]
+    found = affine_residuals(rest, shapes, masses)
+    assert found == pytest.approx(np.linalg.norm(left, axis=(1, 2)), rel=1e-9)
+    assert (found <= shape_differences(rest, shapes, masses)).all()

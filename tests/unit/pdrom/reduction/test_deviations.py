@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from builders import make_scene, random_rotation
+from pdrom.model.metrics import deformation_error
 from pdrom.model.runs import trajectory
 from pdrom.reduction import deviations
 from pdrom.reduction.deviations import (
@@ -41,8 +42,9 @@ def test_the_full_order_run_has_no_error_and_one_that_ended_early_none_at_all():
     measure = yardstick(FLOOR)
     found = errors(measure, measure.reference)
     assert tuple(found) == ERRORS
-    shapes = [found.pop("shape_error"), found.pop("relative_shape_error")]
-    assert shapes == pytest.approx([0.0, 0.0], abs=1e-13)
+    shapes = [found.pop("shape_error"), found.pop("deformation_error")]
+    assert shapes == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert [found.pop(f"{name}_converged") for name in ("error", "deformation")] == [None, None]
     assert set(found.values()) == {0.0}
     for left in (FRAMES, 1):
         assert set(errors(measure, measure.reference[:left]).values()) == {None}
@@ -50,15 +52,37 @@ def test_the_full_order_run_has_no_error_and_one_that_ended_early_none_at_all():
 
 def test_a_rigid_motion_is_an_error_of_positions_and_half_the_speed_one_of_velocities():
     """Half the motion has half the norms of the full order; a rigid motion leaves the shape."""
-    measure = yardstick()
+    measure = yardstick(FLOOR)
     moved = measure.reference @ random_rotation(np.random.default_rng(3)).T + [0.3, 0.1, -0.2]
     found = errors(measure, moved)
     assert found["relative_error_within_horizon"] > 0.1
-    assert found["relative_shape_error"] == pytest.approx(0.0, abs=1e-12)
+    assert found["deformation_error"] == pytest.approx(0.0, abs=1e-10)
+    assert errors(yardstick(), moved)["deformation_error"] is None  # it falls and stays flat
     start = measure.reference[0]
     found = errors(measure, start + 0.5 * (measure.reference - start))
     assert found["velocity_error"] == pytest.approx(0.5)
     assert found["relative_error_within_horizon"] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("end", [11, FRAMES])
+def test_both_errors_cover_the_same_frames_and_masses_count_in_shapes(rng, end):
+    heavy = {"select": "left", "vertex_mass": 90.0}
+    measure = yardstick(FLOOR, masses=[heavy])
+    scene, own = measure.scene, measure.reference
+    run, limit = own + rng.normal(scale=0.01, size=(2, *own.shape))
+    measure = Yardstick(scene, own, limit)
+    outcome = SimpleNamespace(
+        positions=run, difference=np.linalg.norm((run - own)[1:], axis=(1, 2))
+    )
+    found = errors_within(measure.deviations(outcome), measure.series, end, **measure.units)
+    q = run[1 : end + 1]
+    for reference, names in ((own, ERRORS[:2]), (limit, ERRORS[-2:])):
+        p = reference[1 : end + 1]
+        position = np.linalg.norm(q - p) / np.linalg.norm(p - reference[0])
+        expected = [position, deformation_error(q, p, scene.mesh.points, scene.masses)]
+        assert [found[name] for name in names] == pytest.approx(expected, rel=1e-9)
+        assert Yardstick(scene, reference).errors(run, end) == pytest.approx(expected, rel=1e-9)
+    assert measure.errors(run[:end], end) == (None, None)
 
 
 def test_energy_drift_of_a_run_that_stands_still():

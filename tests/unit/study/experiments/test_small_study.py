@@ -6,16 +6,15 @@ The scene is a sheet of springs, held at its left side, that falls for eight fra
 from collections.abc import Callable
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from bad_input.project import make_project
 from pdrom import api
 from pdrom.command import main
 from pdrom.core.store import open_hdf5, read_table, write_table
-from pdrom.core.store.checksum import write_block
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.types import Mesh, stored_mesh
@@ -23,13 +22,15 @@ from places import CONFIG
 from small_scene import run_jobs
 from study.artifact import paths
 from study.artifact.paths import File, Place
-from study.experiments.iterations import IterationSweep, iterations
+from study.experiments.iterations import iterations
 from study.experiments.kit.base import Experiment
+from study.experiments.references import ConvergedStepper, Reference, references
 from study.experiments.repetitions import LadderSection, Options, repetitions
 from study.experiments.reruns import ShortRuns, stability
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study
+from study.tables import declared
 
 SCENE, GROUP, METHOD = "small", "spring", "block-deim"
 ASKED = {
@@ -44,7 +45,7 @@ ASKED = {
     },
 }
 JOBS = (
-    "mesh", "fom", "sensitivity", "subspaces", "iterations", "snapshots", "pod",
+    "mesh", "fom", "sensitivity", "references", "subspaces", "iterations", "snapshots", "pod",
     "reruns", "repetitions", "timing",
 )  # fmt: skip
 STEP, GRAVITY, VERTEX_MASS = 0.016, 9.81, 10.0
@@ -220,42 +221,72 @@ def test_more_iterations_approach_the_converged_run(table):
     assert plain.iterations.tolist() == [1, 2, 5, 10, 20, 60]
     assert (np.diff(plain.error_converged) < 0.0).all()
     assert (mixed < plain.set_index("iterations").error_converged[mixed.index]).all()
-    own, limit = plain[plain.iterations == 10].iloc[0], rows.iloc[-1]
-    assert own.error_scene == 0.0
-    assert limit.residual <= 1e-8
-    # the same two runs, each relative to the other's motion
-    assert limit.error_scene == pytest.approx(own.error_converged, rel=2e-2)
+    names = ["error_converged", "deformation_converged"]
+    own = plain[plain.iterations == 10][names].iloc[0]
+    limit = table(paths.REFERENCES).set_index("motion").loc["train"]
+    assert limit[["full_order_error", "full_order_deformation_error"]].tolist() == own.tolist()
     assert (mixed[[10, 20]] < 0.5 * plain.set_index("iterations").error_converged[[10, 20]]).all()
     assert plain.error_converged.iloc[-1] < 0.1 * plain.error_converged.iloc[0]
-    assert plain.error_scene.iloc[1] < plain.error_scene.iloc[0]
 
 
-def test_the_sweep_ends_at_the_horizon_and_with_runs_that_end(again, at, table, tmp_path):
-    """Of a run in a subspace that ends before, and of frames that do not converge, no error."""
+def shape_norms(runs: np.ndarray, reference: np.ndarray) -> list[float]:
+    """SciPy's distances after the best rigid motion, of equal masses, in each frame."""
+    a, b = (q - q.mean(axis=1, keepdims=True) for q in (runs, reference))
+    return [Rotation.align_vectors(*frames)[1] for frames in zip(b, a, strict=True)]
+
+
+def test_test_trajectories_are_what_numpy_finds_in_the_stored_runs(array, at, mesh):
+    made = declared()["test_trajectories"]([File(at(paths.REFERENCES), {})])
+    assert made.motion.tolist() == list(MOTIONS)
+    training = array(paths.CONVERGED.where(run="train"), "positions")
+    for row in made.itertuples():
+        limit = array(paths.CONVERGED.where(run=row.motion), "positions")
+        full = array(paths.FULL_ORDER.where(run=row.motion), "positions")
+        moved, rest = norms(limit[1:] - limit[0]), np.repeat(mesh.points[None], 8, axis=0)
+        bent = shape_norms(rest, limit[1:])
+        affine = np.c_[mesh.points[:, [0, 2]], np.ones(len(mesh.points))]  # of a flat mesh
+        left = [q - affine @ np.linalg.lstsq(affine, q)[0] for q in limit[1:]]
+        assert row.deformation == pytest.approx(whole(bent, moved), rel=1e-6)
+        assert row.affine == pytest.approx(whole(np.array(left), moved), rel=1e-6)
+        assert row.horizon_frame == 8
+        for run, name in ((full, "full_order"), (training, "replay")):
+            found = getattr(row, f"{name}_error"), getattr(row, f"{name}_deformation_error")
+            expected = norms(run[1:] - limit[1:]), shape_norms(run[1:], limit[1:])
+            assert found == pytest.approx((whole(expected[0], moved), whole(expected[1], bent)))
+
+
+def test_the_error_of_a_reference_is_that_of_its_tolerance(again, table, monkeypatch):
+    """Its second solve is a hundred times finer and starts from the frame's beginning."""
+    solves = []
+
+    def solve(scene, system, tolerance, limit, from_last):
+        solves.append((tolerance, from_last))
+        return ConvergedStepper(scene, system, tolerance, limit, from_last)
+
+    monkeypatch.setattr("study.experiments.references.ConvergedStepper", solve)
+    coarse = again(references, asked=Reference(tolerance=1e-3))["out"]
+    assert solves == [(1e-3, False), (1e-5, True)] * 4
+    own = ["reference_error", "reference_deformation_error"]
+    fine = table(paths.REFERENCES)
+    assert (coarse[own] > 100.0 * fine[own]).all(axis=None)
+    assert (fine[own] < 1e-3).all(axis=None)
+
+
+def test_the_sweep_ends_at_the_horizon_and_with_runs_that_did_not_converge(again, table, tmp_path):
+    """Nothing is compared with such a run."""
     floor = table(paths.SENSITIVITY)
     early = tmp_path / "floor.csv"
     write_table(floor.assign(relative_difference=np.where(floor.frame < 5, 1e-9, 1.0)), early)
-    models = tmp_path / "models.h5"
-    models.write_bytes(Path(at(paths.SUBSPACES)).read_bytes())
-    with h5py.File(models, "a") as file:
-        run = file["models/pod_k004_full/train"]
-        few = run["coordinates"][:3]
-        del run["coordinates"]
-        run["coordinates"] = few
-    write_block(models)
-    cut = {
-        "sensitivity": File(str(early), {"scene": SCENE}),
-        "subspaces": [File(str(models), {"scene": SCENE})],
-    }
-    found = again(iterations, **cut)
-    assert (found["out"].frames == 5).all()
-    own = found["out"].set_index(["iterations", "window"]).error_converged[10, 0]
-    inside = found["models"].set_index(["k", "method"]).error_converged
-    assert inside[2, "full"] > own > 0.0
-    assert np.isnan(inside[4, "full"])
-    unfinished = again(iterations, sweep=IterationSweep(counts=(1,), tolerance=1e-10, limit=2))
-    assert unfinished["out"].error_converged.isna().all()
-    assert unfinished["out"].error_scene.notna().all()
+    cut = {"sensitivity": File(str(early), {"scene": SCENE})}
+    found = again(iterations, **cut)["out"]
+    assert (found.frames == 5).all()
+    assert found.error_converged.notna().all()
+    unfinished = again(references, asked=Reference(limit=2))["out"]
+    names = [n for n in unfinished if n.startswith(("full", "replay", "reference", "deform"))]
+    assert unfinished[names].isna().all(axis=None)
+    assert unfinished.playback_all.notna().all()
+    none = File(str(tmp_path / "train.csv"), {"scene": SCENE})
+    assert again(iterations, converged=none)["out"].error_converged.isna().all()
 
 
 def test_every_setting_holds_every_model_once(again, monkeypatch):

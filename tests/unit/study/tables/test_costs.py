@@ -57,6 +57,9 @@ RUN = st.tuples(
 )
 
 
+KNOWN = {"reference_error": 0.0, "reference_deformation_error": None}  # the converged run is exact
+
+
 def tables(runs) -> pd.DataFrame:
     """Reruns of both motions; the number of the run is its size r."""
     rows = [
@@ -68,13 +71,18 @@ def tables(runs) -> pd.DataFrame:
     held = both[both.held.notna()].drop(columns=ERROR).rename(columns={"held": ERROR})
     held = held.assign(motion="kick", frames=9, blowup_frame=None, horizon_frame=9, speedup=None,
                        playback_error=0.5)  # fmt: skip
-    return pd.concat([both.drop(columns="held").assign(motion="train"), held])
+    rows = pd.concat([both.drop(columns="held").assign(motion="train"), held])
+    return rows.assign(error_converged=rows[ERROR], deformation_converged=rows[ERROR], **KNOWN)
 
 
-def paid(reruns: pd.DataFrame, *fewer: tuple, shares: tuple = ()) -> pd.DataFrame:
-    """Table payoff without other full-order runs than ``fewer``, and with groups of ``shares``."""
-    points = frame(f"scene method position_basis {ERROR} ms_per_frame", *fewer)
-    return payoff(reruns, points, frame("scene effect force_share", *shares))
+def paid(
+    reruns: pd.DataFrame, *fewer: tuple, shares: tuple = (), measure: str = "position"
+) -> pd.DataFrame:
+    """Table payoff by a measure, of full-order runs ``fewer`` and groups of ``shares``."""
+    points = frame(f"scene method position_basis iterations {ERROR} ms_per_frame", *fewer)
+    points = points.assign(deformation_error=points[ERROR], **KNOWN)
+    made = payoff(reruns, points, frame("scene effect force_share", *shares))
+    return made[made.measure == measure].reset_index(drop=True)
 
 
 @given(st.lists(RUN, min_size=1, max_size=12))
@@ -111,7 +119,7 @@ def test_who_pays_is_scored_on_the_held_out_motions():
     runs = [("a", "deim", 0.01, 2.0, 0.05), ("b", "deim", 0.02, 0.5, 0.05)]
     reruns = tables([*runs, ("c", "deim", 0.05, 4.0, 0.2)])
     held = reruns[reruns.motion != "train"]
-    motions = [held.assign(**{ERROR: factor * held[ERROR]}) for factor in (0.5, 1.5)]
+    motions = [held.assign(error_converged=factor * held[ERROR]) for factor in (0.5, 1.5)]
     (row,) = paid(pd.concat([reruns, *motions])).itertuples()
     assert (row.accurate, row.pays, row.loses) == (3, 2, 1)
     assert (row.accurate_heldout, row.pays_heldout, row.heldout) == (2, 1, 3)
@@ -123,6 +131,26 @@ def test_what_did_not_run_does_not_count():
     reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
     (row,) = paid(reruns.assign(max_extent=[1.0, None])).itertuples()
     assert (row.scenes, row.accurate, row.heldout) == (1, 1, 0)
+
+
+def test_a_run_is_accurate_if_both_errors_are_within_the_limit():
+    """Scene a by position alone, b by both, c without a deformation error, as it moves rigidly."""
+    reruns = tables([(scene, "deim", 0.01, 2.0, 0.01) for scene in "abc"])
+    shapes = [0.2, 0.05, None] * 2
+    reruns = reruns.assign(deformation_converged=shapes)
+    position, both = (paid(reruns, measure=name).iloc[0] for name in ("position", "both"))
+    assert (position.accurate, position.accurate_heldout) == (3, 3)
+    assert (both.accurate, both.accurate_heldout, both.error_train) == (2, 2, 0.05)
+
+
+def test_no_run_is_judged_by_a_reference_whose_error_exceeds_a_third_of_the_limit():
+    """Of scene b the positions are known well enough, of c nothing is known, nor of a kicked."""
+    reruns = tables([(scene, "deim", 0.01, 2.0, 0.01) for scene in "abc"])
+    own = {"reference_error": [0.033, 0.033, None, 0.034, 0.033, None]}
+    reruns = reruns.assign(**own, reference_deformation_error=[0.033, 0.034, None] * 2)
+    position, both = (paid(reruns, measure=name).iloc[0] for name in ("position", "both"))
+    assert (position.scenes, position.heldout) == (2, 1)
+    assert (both.scenes, both.heldout) == (1, 0)
 
 
 NO_RUNS = pd.DataFrame(columns=["scene", "perturbation", "frame", "relative_difference"])
@@ -194,9 +222,10 @@ def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_p
 
 
 def test_fewer_iterations_are_the_first_opponent_and_groups_without_force_do_not_count():
-    fewer = [("a", 0.2, 1.0), ("a", 0.05, 2.0), ("b", 0.3, 1.0)]
-    early = [(scene, "fewer-iterations", "full", *rest) for scene, *rest in fewer]
-    early += [("a", "full", "full", 0.0, 6.0), ("b", "full", "full", 0.0, 4.0)]
+    """Runs with the scene's ten iterations or more are no opponents."""
+    fewer = [("a", 2, 0.2, 1.0), ("a", 5, 0.05, 2.0), ("b", 2, 0.3, 1.0), ("b", 10, 0.01, 4.0)]
+    early = [(scene, "fom", "full", *rest) for scene, *rest in fewer]
+    early += [(scene, "full", "full", 10, 0.01, ms) for scene, ms in (("a", 6.0), ("b", 4.0))]
     reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
     shares = [("a", "spring", 1e-3), ("b", "spring", 2e-3)]  # the former counts for nothing
     first, own = paid(reruns, *early, shares=shares).itertuples()

@@ -79,11 +79,12 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
     steps = {"scene": ["a"], "group": ["spring"], "method": ["deim"], "r": [6]}
     write_table(pd.DataFrame({**steps, "reduction_s": [0.1]}), tmp_path / "projections.csv")
     runs = pd.concat([
-        pd.DataFrame(models).assign(group="all", r=7, relative_error_within_horizon=0.01),
-        pd.DataFrame(steps).assign(position_basis="full", relative_error_within_horizon=0.2),
+        pd.DataFrame(models).assign(group="all", r=7, error_converged=0.01),
+        pd.DataFrame(steps).assign(position_basis="full", error_converged=0.2),
     ])  # fmt: skip
     unseen = runs[runs.method == "ecsw"].assign(motion="kick")
     runs = pd.concat([runs.assign(motion="train"), unseen])
+    runs = runs.assign(deformation_converged=3.0 * runs.error_converged)
     runs = runs.assign(frames=9, blowup_frame=None, horizon_frame=9, playback_error=0.5)
     files = {n: [File(str(tmp_path / f"{n}.csv"), {})] for n in ("projections", "subspaces")}
     files |= {"parts": measured, "large": []}
@@ -100,6 +101,9 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
     assert table.frames_to_break_even["ecsw"] == pytest.approx(450.0 / 2.25)
     assert pd.isna(table.frames_to_break_even["deim"])
     assert table.error_train.to_dict() == {"ecsw": 0.01, "deim": 0.2}
+    assert table.deformation_train.to_dict() == pytest.approx({"ecsw": 0.03, "deim": 0.6})
+    assert table.deformation_heldout["ecsw"] == pytest.approx(0.03)
+    assert set(table.reference) == {"converged"}
     assert (table.error_heldout["ecsw"], table.playback_error["ecsw"]) == (0.01, 0.5)
     assert pd.isna(table.error_heldout["deim"])
 

@@ -153,10 +153,12 @@ def test_an_error_is_the_median_over_the_motions_that_can_be_judged():
         {"r": 6, error: 0.7, "motion": TRAIN}, {"r": 20, error: 0.8, "motion": TRAIN},
     ]  # fmt: skip
     table = pd.DataFrame([usual | run for run in runs])
+    table["deformation_error"] = 2.0 * table[error].where(table.playback_error == 0.5)
     found = over_motions(table).set_index("r")
     assert found.loc[6, "error_heldout"] == pytest.approx(0.2)
     assert tuple(found.loc[6, ["error_heldout_low", "error_heldout_high"]]) == (0.1, 0.3)
     assert tuple(found.loc[10, ["error_heldout", "error_heldout_high"]]) == (0.5, np.inf)
+    assert found.deformation_heldout.to_dict() == pytest.approx({6: 0.4, 10: 1.0})
     assert found.motions.to_dict() == {6: 3, 10: 3}
     assert found.playback_error.to_dict() == {6: 0.5, 10: 0.5}
     beside = with_held_out(trained(table)[KEYS], table)

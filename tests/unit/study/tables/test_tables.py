@@ -1,6 +1,6 @@
 """Tables of the study from small files, against values worked out by hand."""
 
-from pathlib import Path
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -55,6 +55,12 @@ NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times
 DISPLACEMENT = np.array([1.0, 2.0, 3.0, 4.0])
 ENERGY, CONTACT = [1.0, 0.9], np.array([0, 0, 1, 1], dtype=np.uint8)
 STEP = DISPLACEMENT / 2.0  # of the velocities; their differences are thrice those of the positions
+UNITS = {"rest_norm": 1.0, "time_step": 0.1}
+SERIES = {
+    "displacement": DISPLACEMENT, "step": STEP, "energy": ENERGY, "contact": CONTACT,
+    "deformed": DISPLACEMENT / 5.0, "displacement_converged": 2.0 * DISPLACEMENT,
+    "deformed_converged": DISPLACEMENT / 5.0,
+}  # fmt: skip
 
 
 def beside(runs: list[str], end: str) -> list[str]:
@@ -66,8 +72,13 @@ def each(place: paths.Place, found: list[str]) -> list[File]:
 
 
 def store_series(run, difference):
-    """Series of a run with these differences; it touches the floor at once."""
-    run["difference"], run["shape_difference"] = difference, np.divide(difference, 10.0)
+    """Series of a run with these differences; it touches the floor at once.
+
+    Its deformation error is half the position error; against the converged run both are doubled.
+    """
+    for name, factor in (("", 1.0), ("_converged", 4.0)):
+        run[f"difference{name}"] = np.multiply(difference, factor)
+        run[f"shape_difference{name}"] = np.multiply(difference, 0.1 if not name else 0.2)
     run["step_difference"] = np.multiply(difference, 3.0)
     run["energy"], run["contact"] = [1.0, 0.7], np.ones(len(difference), dtype=np.uint8)
 
@@ -78,28 +89,21 @@ def files(tmp_path) -> dict[str, object]:
 
     Scene a leaves the threshold in frame 2 (held out: 1), scene b never does.
     """
-    reruns, full_order = [], []
+    reruns = []
     cases = {
         # differences of each run by frame; short ones blew up
         "a": {6: [0.1, 0.2, 9.0, 9.0], 10: [0.5], 20: None},
         "b": {6: [0.1, 0.1, 0.1, 0.1], 10: [0.2, 0.2]},
     }
     for scene, runs in cases.items():
-        for motion in (TRAIN, *MOTIONS):
-            full_order.append(str(tmp_path / "fom" / scene / f"{motion}.h5"))
-            Path(full_order[-1]).parent.mkdir(parents=True, exist_ok=True)
-            with write_hdf5(full_order[-1]) as file:  # held out, it moves twice as far
-                scale = 1.0 if motion == TRAIN else 2.0
-                moved = scale * np.concatenate([[0.0], DISPLACEMENT])
-                file["positions"] = np.tile(moved[:, None, None], (1, 1, 3))
         folder = tmp_path / "reruns" / scene / "spring"
         folder.mkdir(parents=True)
         rows = []
         with write_hdf5(folder / "deim.h5") as file:
-            file.attrs.update(extent_norm=2.0, time_step=0.1)
+            file.attrs.update(extent_norm=2.0, **UNITS)
             for store in (file, *map(file.create_group, MOTIONS)):
-                store["displacement"], store["step"] = DISPLACEMENT, STEP
-                store["energy"], store["contact"] = ENERGY, CONTACT
+                for series, values in SERIES.items():
+                    store[series] = values
                 for r, difference in runs.items():
                     run = store.create_group(f"r{r:04d}")
                     if difference is not None:
@@ -121,10 +125,9 @@ def files(tmp_path) -> dict[str, object]:
     folder.mkdir(parents=True)
     models = {("pod", 8, "full"): [0.4] * 4, ("pod", 8, "ecsw-1e-02"): [0.8] * 4}
     with write_hdf5(folder / "models.h5") as file:
-        file.attrs.update(extent_norm=4.0, time_step=0.1)
-        for motion in ("train", *MOTIONS):
-            file[f"displacement/{motion}"], file[f"step/{motion}"] = DISPLACEMENT, STEP
-            file[f"energy/{motion}"], file[f"contact/{motion}"] = ENERGY, CONTACT
+        file.attrs.update(extent_norm=4.0, **UNITS)
+        for motion, (series, values) in product(("train", *MOTIONS), SERIES.items()):
+            file[f"{series}/{motion}"] = values
         for (base, k, method), difference in models.items():
             for motion in ("train", "heldout"):
                 run = file.create_group(f"models/{base}_k{k:03d}_{method}/{motion}")
@@ -170,10 +173,17 @@ def files(tmp_path) -> dict[str, object]:
         ("b", "heldout", 1): [1e-12] * 4,
     }
     rows = [(*key, number, v) for key, own in values.items() for number, v in enumerate(own)]
+    references = [
+        {"scene": scene, "motion": motion, "frames": 4, "horizon_frame": 4, "playback_all": 0.5,
+         "playback_error": 0.5 if motion == "heldout" else None, "playback_deformation_error": 0.4,
+         "replay_error": 0.3, "replay_deformation_error": 0.2,
+         "reference_error": 0.01 if scene == "a" else 0.02, "reference_deformation_error": 0.03}
+        for scene, motion in product("ab", (TRAIN, *MOTIONS))
+    ]  # fmt: skip
     path = tmp_path / "sensitivity.csv"
     write_table(frame("scene perturbation seed frame relative_difference", *rows), path)
     return {
-        "full_order": each(paths.FULL_ORDER, full_order),
+        "references": [written(tmp_path / "references.csv", *references)],
         "runs": each(paths.RERUNS, reruns),
         "rows": each(paths.RERUNS_TRAIN, beside(reruns, ".csv")),
         "rows_heldout": each(paths.RERUNS_HELDOUT, beside(reruns, "_heldout.csv")),
@@ -196,8 +206,11 @@ def test_what_users_look_at_before_the_horizon(files):
     np.testing.assert_allclose(table.shape_error, table.error_over_extent / 10.0)
     # over the frames before the horizon, too: three times the difference over half the norm
     np.testing.assert_allclose(table.velocity_error, 6.0 * table.relative_error_within_horizon)
-    shape = table.relative_shape_error
-    np.testing.assert_allclose(shape, table.relative_error_within_horizon / 10.0)
+    within = table.relative_error_within_horizon
+    np.testing.assert_allclose(table.deformation_error, within / 2.0)
+    np.testing.assert_allclose(table.error_converged, 2.0 * within)
+    np.testing.assert_allclose(table.deformation_converged, within)
+    assert table.reference_error.tolist() == [0.01] * 3 + [0.02] * 4
     # scene a ends before the second sample of the energy
     assert table.energy_drift.isna().tolist() == [True, True, True, False, True, False, False]
     assert table.energy_drift[[3, 5, 6]].tolist() == pytest.approx([0.2] * 3)
@@ -244,6 +257,8 @@ def test_held_out_runs_are_judged_by_their_own_horizon(files):
     assert played.relative_error.tolist() == pytest.approx([0.5] * 6)
     assert played.playback_error["heldout"].to_dict() == pytest.approx({"a": 0.5, "b": 0.5})
     assert played.playback_error["kick"].isna().all()  # nobody perturbed that motion
+    names = ["deformation_error", "error_converged", "deformation_converged"]
+    assert played.loc[("heldout", "a"), names].tolist() == [0.4, 0.3, 0.2]
     table = table[(table.motion != TRAIN) & (table.method != PLAYBACK)].reset_index(drop=True)
     assert table.playback_error.tolist() == pytest.approx([0.5] * 7)
     assert table.horizon_frame.tolist() == [1, 1, 1, 4, 4, 4, 4]
@@ -276,69 +291,48 @@ def test_pareto_keeps_what_nothing_beats(points):
 
 
 def sweep(folder, **changes) -> File:
-    """Scene a with K = 2, 10 (its own) and 40, and the converged run, or with ``changes``."""
+    """Scene a with K = 2, 10 (its own) and 40, all or with ``changes``."""
     rows = [
-        {"iterations": 2, "window": 0, "error_converged": 0.4, "error_scene": 0.3},
-        {"iterations": 10, "window": 0, "error_converged": 0.1, "error_scene": 0.0},
-        {"iterations": 40, "window": 0, "error_converged": 0.02, "error_scene": 0.09},
-        {"iterations": 10, "window": 5, "error_converged": 0.01, "error_scene": 0.1},
-        {"error_converged": 0.0, "error_scene": 0.1, "residual": 1e-9},
+        {"iterations": k, "window": w, "error_converged": e, "deformation_converged": 3.0 * e}
+        for k, w, e in ((2, 0, 0.4), (10, 0, 0.1), (40, 0, 0.02), (10, 5, 0.01))
     ]
-    rows = [{"scene": "a", "frames": 2} | row | changes for row in rows]
-    return written(folder / "sweep.csv", *rows)
+    return written(folder / "sweep.csv", *({"scene": "a", "frames": 2} | r | changes for r in rows))
 
 
-def points(files, runs, *parts) -> pd.DataFrame:
-    """The table accuracy_cost of these runs, with files of other iterations and of models."""
-    read = {"timings": files["timings"], "sweeps": list(parts[:1]), "models": list(parts[1:])}
+def points(files, runs, other) -> pd.DataFrame:
+    """The table accuracy_cost of these runs, with the file of ``other`` iterations."""
+    read = {"timings": files["timings"], "sweeps": [other]}
     return accuracy_cost(runs, NOT_TIMED, {"a": 10, "b": 20}, **read)
 
 
-def test_accuracy_cost_holds_full_runs_and_reruns(files, tmp_path):
-    runs, nothing = reduced_reruns(**files), sweep(tmp_path, scene="absent")
-    table = points(files, runs, nothing)
-    found = list(zip(table.scene, table.method, table.ms_per_frame, strict=True))
-    assert found == [
-        ("a", "full", 8.0), ("a", "deim", 4.0),
-        ("b", "full", 10.0), ("b", "deim", 2.0), ("b", "full", 1.0), ("b", "ecsw-1e-02", 0.5),
+def test_accuracy_cost_compares_all_runs_with_the_converged_one(files, tmp_path):
+    """The run of the scene's iterations is there twice; 40 iterations lose to acceleration."""
+    runs = reduced_reruns(**files)
+    table = points(files, runs, sweep(tmp_path))
+    columns = ["scene", "method", "iterations", "ms_per_frame", "pareto"]
+    assert list(table[columns].itertuples(index=False, name=None)) == [
+        ("a", "full", 10, 8.0, True), ("a", "deim", 10, 4.0, True), ("a", "fom", 2, 2.5, True),
+        ("a", "fom", 10, 8.0, True), ("a", "fom", 40, 24.0, False),
+        ("a", "fom-anderson", 10, 9.0, True), ("b", "deim", 20, 2.0, True),
+        ("b", "full", 20, 1.0, True), ("b", "ecsw-1e-02", 20, 0.5, True),
     ]  # fmt: skip
-    assert table.position_basis.tolist() == ["full", "full", "full", "full", "pod", "pod"]
-    assert table.iterations.tolist() == [10, 10, 20, 20, 20, 20]
-    assert table.relative_error_within_horizon[[0, 2]].tolist() == [0.0, 0.0]
-    assert table.pareto.tolist() == [True] * 6
-    slow = points(files, runs.assign(ms_per_frame=100.0), nothing)
-    assert slow.pareto.tolist() == [True, False, True, False, False, False]
+    reduced = 2.0 * error([0.1, 0.2], 2)
+    found = table[table.scene == "a"]
+    within = found.relative_error_within_horizon.tolist()
+    assert within == pytest.approx([0.1, reduced, 0.4, 0.1, 0.02, 0.01])
+    shape = found.deformation_error.tolist()
+    assert shape == pytest.approx([0.3, reduced / 2.0, 1.2, 0.3, 0.06, 0.03])
+    assert set(table.reference) == {"converged"}
+    assert found.reference_error.tolist() == [0.01] * 6
+    slow = points(files, runs.assign(ms_per_frame=100.0), sweep(tmp_path))
+    assert slow.pareto[slow.method == "deim"].tolist() == [False, True]
 
 
-def test_runs_with_other_iterations_have_their_own_reference(files, tmp_path):
-    model = {"scene": "b", "position_basis": "pod", "k": 8, "method": "ecsw-1e-02"}
-    model["error_converged"] = 0.3
-    inside = written(tmp_path / "models.csv", model)
-    table = points(files, reduced_reruns(**files), sweep(tmp_path), inside)
-    assert table[table.position_basis == "pod"].error_converged.tolist()[1:] == [0.3]
-    assert table[table.method == "full"].error_converged.tolist()[:1] == [0.1]
-    fom = table[table.method == "fom"]
-    assert fom.iterations.tolist() == [2, 10, 40]
-    assert fom.relative_error_within_horizon.tolist() == [0.4, 0.1, 0.02]
-    assert fom.ms_per_frame.tolist() == [2.5, 8.0, 24.0]
-    # the accelerated run beats 40 plain iterations in both
-    assert fom.pareto.tolist() == [True, True, False]
-    fast = table[table.method == "fom-anderson"]
-    columns = ["iterations", "relative_error_within_horizon", "ms_per_frame"]
-    assert fast[columns].to_numpy().tolist() == [[10, 0.01, 9.0]]
-    early = table[table.method == "fewer-iterations"]
-    assert early.iterations.tolist() == [2]
-    assert early.relative_error_within_horizon.tolist() == [0.3]
-    # 0.3 in 2.5 ms beats no point with the same reference: the reduced run has 0.1 in 4 ms
-    assert early.pareto.tolist() == [True]
-    # against the converged run 0.1 takes 8 ms; the reduced run, 0.1 in 4 ms, is no rival of it
-    assert fom.position_basis.unique().tolist() == ["full"]
-
-
-def test_without_a_converged_run_there_is_no_point_against_it(files, tmp_path):
-    table = points(files, reduced_reruns(**files), sweep(tmp_path, error_converged=None))
-    assert "fom" not in set(table.method)
-    assert (table.method == "fewer-iterations").sum() == 1
+def test_without_a_converged_run_there_is_no_point(files, tmp_path):
+    runs, none = reduced_reruns(**files), sweep(tmp_path, error_converged=None)
+    table = points(files, runs, none)
+    assert not {"fom", "fom-anderson"} & set(table.method)
+    assert points(files, runs.assign(error_converged=None), none).empty
 
 
 def test_local_share_counts_assembly_and_is_the_share_of_the_whole_frame(tmp_path, files):

@@ -53,6 +53,7 @@ def tables() -> dict[str, pd.DataFrame]:
     )
     reruns["speedup"] = 2.0 / reruns.local_ms
     reruns = reruns.assign(motion="train", horizon_frame=9, playback_error=0.5)
+    reruns["deformation_error"] = 3.0 * reruns.relative_error_within_horizon
     twice = reruns.assign(relative_error_within_horizon=2.0 * reruns.relative_error_within_horizon)
     factors = {"heldout": reruns, "kick": twice, "stiffness": twice}
     held_out = [rows.assign(motion=motion, speedup=None) for motion, rows in factors.items()]
@@ -240,9 +241,10 @@ def claim(*tests: dict) -> dict:
     base = {
         "what": "rows", "metric": "local_share", "compare": ">=", "threshold": 0.4, "margin": 1.0,
     }  # fmt: skip
+    given = [{k: v for k, v in (base | test).items() if v is not None} for test in tests]
     return {
         **WORDS,
-        "published": [base | test for test in tests],
+        "published": given,
         "beyond": [base],
         "changes": [{"date": "2026-01-31", "after_data": False, "reason": "First version."}],
     }
@@ -283,10 +285,28 @@ FALSE = {"threshold": 0.99}
 def test_every_verdict(tmp_path, tests, expected):
     row = verdict(tmp_path, *tests)
     assert row.verdict == expected
+    assert (row.verdict_both, row.verdict_beyond_both) == (expected, HOLDS)  # not of reruns
     assert row.verdict_beyond == HOLDS
     assert row["why"].count("rows:") == len(tests)
     assert row.answer.startswith(f"as published it {expected},")
     assert row.measured.count(";") == sum(t.get("decides", True) for t in tests) - 1
+
+
+def test_verdicts_by_both_errors_are_those_of_the_larger_one(tmp_path):
+    """Thrice the position error of each run, or nothing where the reference moves rigidly."""
+    test = {"metric": "rerun_error", "compare": "<=", "margin": None, "where": {"scene": ["a"]}}
+    for threshold, both in ((0.4, DEPENDS), (1.3, HOLDS)):
+        row = verdict(tmp_path, test | {"threshold": threshold})
+        assert (row.verdict, row.verdict_both) == (HOLDS, both)
+        rows = claims_sensitivity(tmp_path / "claims.yaml", {}, **whole())
+        varied = rows[rows.varied == "measure"]
+        assert varied[["part", "variation", "verdict"]].to_numpy().tolist() == [
+            ["published", "both", both]
+        ]
+    rigid = whole()
+    rigid["reduced_reruns"] = rigid["reduced_reruns"].assign(deformation_error=None)
+    verdict(tmp_path, test | {"threshold": 0.4})
+    assert claims(tmp_path / "claims.yaml", {}, **rigid).verdict_both[0] == HOLDS
 
 
 @pytest.mark.parametrize(
@@ -413,8 +433,8 @@ def test_a_metric_reads_no_column_that_it_does_not_name(name):
 def test_only_claims_about_times_are_timed():
     timed = {name: verdicts.timed_columns(rule) for name, rule in RULES.items()}
     one = {"measured", "verdict", "condition", "why"}
-    assert timed["C1"] == timed["C9"] == one | {"why_beyond", "answer"}
-    assert timed["C11"] == {f"{name}_beyond" for name in one} | {"answer"}
+    assert timed["C1"] == timed["C9"] == one | {"why_beyond", "answer", "verdict_both"}
+    assert timed["C11"] == {f"{name}_beyond" for name in one} | {"answer", "verdict_beyond_both"}
     assert timed["C2"] == timed["C7"] == timed["C12"] == set()
 
 
