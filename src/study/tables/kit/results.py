@@ -153,7 +153,8 @@ def measured(rows: pd.DataFrame, measure: str) -> pd.DataFrame:
     position = rows[ERROR].astype(float)
     if measure == POSITION:
         return rows
-    return rows.assign(**{ERROR: np.fmax(position, rows[DEFORMATION]).where(position.notna())})
+    shape = rows[DEFORMATION].astype(float)
+    return rows.assign(**{ERROR: np.fmax(position, shape).where(position.notna())})
 
 
 def judged_by(rows: pd.DataFrame, measure: str, limit: float) -> pd.DataFrame:
