@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from builders import GRAVITY, TOP, make_scene, with_effects
 from pdrom.model.energy import STRIDE, EnergyScale, energies, largest
-from pdrom.model.metrics import relative_errors, shape_differences, trajectory_error
+from pdrom.model.metrics import relative_errors, trajectory_error
 from pdrom.model.runs import trajectory
 from strategies import SEEDS
 
@@ -119,14 +119,3 @@ def test_trajectory_error_weighs_frames_by_their_motion():
     # a run at rest has none
     for frames in (0, 3):
         assert trajectory_error(np.ones(frames), np.zeros(frames)) is None
-
-
-def test_shapes_of_flat_and_far_grown_frames():
-    """Frames of a plane or of a point have finite differences, and no frames have none."""
-    shape, masses = np.random.default_rng(1).normal(size=(1, 9, 3)), np.ones(9)
-    flat = shape * [1.0, 1.0, 0.0]
-    assert shape_differences(flat, flat, masses)[0] == pytest.approx(0.0, abs=1e-13)
-    size = np.linalg.norm(flat - flat.mean(axis=1))
-    assert shape_differences(np.zeros((9, 3)), flat, masses)[0] == pytest.approx(size)
-    assert np.isfinite(shape_differences(1e200 * flat, flat, masses)).all()
-    assert len(shape_differences(flat[:0], flat[:0], masses)) == 0

@@ -28,11 +28,11 @@ def yardstick(*effects, **settings) -> Yardstick:
     return Yardstick(scene, trajectory(scene))
 
 
-def errors(measure: Yardstick, positions: np.ndarray) -> dict:
+def errors(measure: Yardstick, positions: np.ndarray, end: int = FRAMES) -> dict:
     apart = (positions - measure.reference[: len(positions)])[1:]
     difference = np.linalg.norm(apart, axis=(1, 2))
     found = measure.deviations(SimpleNamespace(positions=positions, difference=difference))
-    return errors_within(found, measure.series, len(measure.displacement), **measure.units)
+    return errors_within(found, measure.series, end, **measure.units)
 
 
 FLOOR = {"effect": "floor", "height": 1.5}
@@ -66,18 +66,12 @@ def test_a_rigid_motion_is_an_error_of_positions_and_half_the_speed_one_of_veloc
 
 @pytest.mark.parametrize("end", [11, FRAMES])
 def test_both_errors_cover_the_same_frames_and_masses_count_in_shapes(rng, end):
-    heavy = {"select": "left", "vertex_mass": 90.0}
-    measure = yardstick(FLOOR, masses=[heavy])
+    measure = yardstick(FLOOR, masses=[{"select": "left", "vertex_mass": 90.0}])
     scene, own = measure.scene, measure.reference
     run, limit = own + rng.normal(scale=0.01, size=(2, *own.shape))
-    measure = Yardstick(scene, own, limit)
-    outcome = SimpleNamespace(
-        positions=run, difference=np.linalg.norm((run - own)[1:], axis=(1, 2))
-    )
-    found = errors_within(measure.deviations(outcome), measure.series, end, **measure.units)
-    q = run[1 : end + 1]
+    found = errors(Yardstick(scene, own, limit), run, end)
     for reference, names in ((own, ERRORS[:2]), (limit, ERRORS[-2:])):
-        p = reference[1 : end + 1]
+        q, p = run[1 : end + 1], reference[1 : end + 1]
         position = np.linalg.norm(q - p) / np.linalg.norm(p - reference[0])
         expected = [position, deformation_error(q, p, scene.mesh.points, scene.masses)]
         assert [found[name] for name in names] == pytest.approx(expected, rel=1e-9)

@@ -12,6 +12,7 @@ from pdrom.core.yamlfile import validate
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.types import save_mesh
 from pdrom.model.scene import SceneConfig
+from pdrom.reduction.deviations import ERRORS
 from study.artifact.paths import File
 from study.experiments import frame_times as timing
 from study.experiments import subspaces as experiment
@@ -20,7 +21,7 @@ from study.experiments.kit.measurement import Processes, in_processes
 from study.experiments.subspaces import COLUMNS, LARGE_COLUMNS, Hrpd, LargeModels, Online
 from study.tables.effects_cost import frame_times, online, speedups
 
-JUDGED = ("motion", "relative_error_within_horizon", "horizon_frame", "playback_error")
+JUDGED = ("motion", "horizon_frame", "playback_error", *ERRORS)
 NO_RERUNS = pd.DataFrame(columns=[*COLUMNS, *JUDGED])
 ONCE = Processes(frames=3, repeats=1, processes=1)
 CHANGES = {"reduce": {"spring": {"train": 5}}, "held_out": {"kick": 0.5}}

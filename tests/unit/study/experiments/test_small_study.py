@@ -5,6 +5,7 @@ The scene is a sheet of springs, held at its left side, that falls for eight fra
 
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pandas as pd
@@ -221,10 +222,9 @@ def test_more_iterations_approach_the_converged_run(table):
     assert plain.iterations.tolist() == [1, 2, 5, 10, 20, 60]
     assert (np.diff(plain.error_converged) < 0.0).all()
     assert (mixed < plain.set_index("iterations").error_converged[mixed.index]).all()
-    names = ["error_converged", "deformation_converged"]
-    own = plain[plain.iterations == 10][names].iloc[0]
-    limit = table(paths.REFERENCES).set_index("motion").loc["train"]
-    assert limit[["full_order_error", "full_order_deformation_error"]].tolist() == own.tolist()
+    own, limit = plain[plain.iterations == 10], table(paths.REFERENCES).query("motion == 'train'")
+    for name, same in (("error", "error"), ("deformation", "deformation_error")):
+        assert own[f"{name}_converged"].tolist() == limit[f"full_order_{same}"].tolist()
     assert (mixed[[10, 20]] < 0.5 * plain.set_index("iterations").error_converged[[10, 20]]).all()
     assert plain.error_converged.iloc[-1] < 0.1 * plain.error_converged.iloc[0]
 
@@ -238,36 +238,29 @@ def shape_norms(runs: np.ndarray, reference: np.ndarray) -> list[float]:
 def test_test_trajectories_are_what_numpy_finds_in_the_stored_runs(array, at, mesh):
     made = declared()["test_trajectories"]([File(at(paths.REFERENCES), {})])
     assert made.motion.tolist() == list(MOTIONS)
-    training = array(paths.CONVERGED.where(run="train"), "positions")
+    training = array(paths.CONVERGED.where(run="train"), "positions")[1:]
+    rest = np.repeat(mesh.points[None], 8, axis=0)
+    affine = np.c_[mesh.points[:, [0, 2]], np.ones(len(mesh.points))]  # of a flat mesh
     for row in made.itertuples():
-        limit = array(paths.CONVERGED.where(run=row.motion), "positions")
-        full = array(paths.FULL_ORDER.where(run=row.motion), "positions")
-        moved, rest = norms(limit[1:] - limit[0]), np.repeat(mesh.points[None], 8, axis=0)
-        bent = shape_norms(rest, limit[1:])
-        affine = np.c_[mesh.points[:, [0, 2]], np.ones(len(mesh.points))]  # of a flat mesh
-        left = [q - affine @ np.linalg.lstsq(affine, q)[0] for q in limit[1:]]
-        assert row.deformation == pytest.approx(whole(bent, moved), rel=1e-6)
-        assert row.affine == pytest.approx(whole(np.array(left), moved), rel=1e-6)
-        assert row.horizon_frame == 8
+        limit = array(paths.CONVERGED.where(run=row.motion), "positions")[1:]
+        full = array(paths.FULL_ORDER.where(run=row.motion), "positions")[1:]
+        moved, bent = norms(limit - rest), shape_norms(rest, limit)
+        left = np.array([q - affine @ np.linalg.lstsq(affine, q)[0] for q in limit])
+        shares = whole(bent, moved), whole(left, moved)
+        assert (row.deformation, row.affine) == pytest.approx(shares, rel=1e-6)
         for run, name in ((full, "full_order"), (training, "replay")):
             found = getattr(row, f"{name}_error"), getattr(row, f"{name}_deformation_error")
-            expected = norms(run[1:] - limit[1:]), shape_norms(run[1:], limit[1:])
-            assert found == pytest.approx((whole(expected[0], moved), whole(expected[1], bent)))
+            errors = whole(norms(run - limit), moved), whole(shape_norms(run, limit), bent)
+            assert found == pytest.approx(errors)
 
 
-def test_the_error_of_a_reference_is_that_of_its_tolerance(again, table, monkeypatch):
+def test_the_error_of_a_reference_is_that_of_its_tolerance(again, table):
     """Its second solve is a hundred times finer and starts from the frame's beginning."""
-    solves = []
-
-    def solve(scene, system, tolerance, limit, from_last):
-        solves.append((tolerance, from_last))
-        return ConvergedStepper(scene, system, tolerance, limit, from_last)
-
-    monkeypatch.setattr("study.experiments.references.ConvergedStepper", solve)
-    coarse = again(references, asked=Reference(tolerance=1e-3))["out"]
-    assert solves == [(1e-3, False), (1e-5, True)] * 4
-    own = ["reference_error", "reference_deformation_error"]
-    fine = table(paths.REFERENCES)
+    with patch("study.experiments.references.ConvergedStepper", wraps=ConvergedStepper) as solves:
+        coarse = again(references, asked=Reference(tolerance=1e-3))["out"]
+    found = [(call.args[2], call.kwargs["from_last"]) for call in solves.call_args_list]
+    assert found == [(1e-3, False), (1e-5, True)] * 4
+    own, fine = ["reference_error", "reference_deformation_error"], table(paths.REFERENCES)
     assert (coarse[own] > 100.0 * fine[own]).all(axis=None)
     assert (fine[own] < 1e-3).all(axis=None)
 
@@ -275,16 +268,13 @@ def test_the_error_of_a_reference_is_that_of_its_tolerance(again, table, monkeyp
 def test_the_sweep_ends_at_the_horizon_and_with_runs_that_did_not_converge(again, table, tmp_path):
     """Nothing is compared with such a run."""
     floor = table(paths.SENSITIVITY)
-    early = tmp_path / "floor.csv"
-    write_table(floor.assign(relative_difference=np.where(floor.frame < 5, 1e-9, 1.0)), early)
-    cut = {"sensitivity": File(str(early), {"scene": SCENE})}
-    found = again(iterations, **cut)["out"]
+    early = File(str(tmp_path / "floor.csv"), {"scene": SCENE})
+    write_table(floor.assign(relative_difference=np.where(floor.frame < 5, 1e-9, 1.0)), early.path)
+    found = again(iterations, sensitivity=early)["out"]
     assert (found.frames == 5).all()
     assert found.error_converged.notna().all()
     unfinished = again(references, asked=Reference(limit=2))["out"]
-    names = [n for n in unfinished if n.startswith(("full", "replay", "reference", "deform"))]
-    assert unfinished[names].isna().all(axis=None)
-    assert unfinished.playback_all.notna().all()
+    assert unfinished.filter(regex="^(full|replay|reference|deform)").isna().all(axis=None)
     none = File(str(tmp_path / "train.csv"), {"scene": SCENE})
     assert again(iterations, converged=none)["out"].error_converged.isna().all()
 

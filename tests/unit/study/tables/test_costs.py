@@ -48,6 +48,7 @@ def test_every_line_has_its_own_break_even(tmp_path):
 
 
 ERROR = "relative_error_within_horizon"
+KNOWN = {"reference_error": 0.0, "reference_deformation_error": None}  # the converged run is exact
 RUN = st.tuples(
     st.sampled_from("abc"),
     st.sampled_from(["deim", "pod"]),
@@ -55,9 +56,6 @@ RUN = st.tuples(
     st.sampled_from([None, 0.5, 1.0, 2.0, 8.0]),  # speed-up, if it was timed
     st.sampled_from([None, 0.2, 0.3]),  # error of the held-out motion, if it was run
 )
-
-
-KNOWN = {"reference_error": 0.0, "reference_deformation_error": None}  # the converged run is exact
 
 
 def tables(runs) -> pd.DataFrame:
@@ -75,14 +73,12 @@ def tables(runs) -> pd.DataFrame:
     return rows.assign(error_converged=rows[ERROR], deformation_converged=rows[ERROR], **KNOWN)
 
 
-def paid(
-    reruns: pd.DataFrame, *fewer: tuple, shares: tuple = (), measure: str = "position"
-) -> pd.DataFrame:
-    """Table payoff by a measure, of full-order runs ``fewer`` and groups of ``shares``."""
+def paid(reruns, *fewer: tuple, shares: tuple = (), by: str = "position") -> pd.DataFrame:
+    """Table payoff of one measure, of full-order runs ``fewer`` and groups of ``shares``."""
     points = frame(f"scene method position_basis iterations {ERROR} ms_per_frame", *fewer)
     points = points.assign(deformation_error=points[ERROR], **KNOWN)
     made = payoff(reruns, points, frame("scene effect force_share", *shares))
-    return made[made.measure == measure].reset_index(drop=True)
+    return made[made.measure == by].reset_index(drop=True)
 
 
 @given(st.lists(RUN, min_size=1, max_size=12))
@@ -133,24 +129,20 @@ def test_what_did_not_run_does_not_count():
     assert (row.scenes, row.accurate, row.heldout) == (1, 1, 0)
 
 
-def test_a_run_is_accurate_if_both_errors_are_within_the_limit():
-    """Scene a by position alone, b by both, c without a deformation error, as it moves rigidly."""
+def test_a_run_is_accurate_if_both_errors_are_and_their_reference_is_known():
+    """Scene a by position alone, c moves rigidly; b is known to a third of the limit, or half."""
     reruns = tables([(scene, "deim", 0.01, 2.0, 0.01) for scene in "abc"])
-    shapes = [0.2, 0.05, None] * 2
-    reruns = reruns.assign(deformation_converged=shapes)
-    position, both = (paid(reruns, measure=name).iloc[0] for name in ("position", "both"))
-    assert (position.accurate, position.accurate_heldout) == (3, 3)
-    assert (both.accurate, both.accurate_heldout, both.error_train) == (2, 2, 0.05)
+    reruns = reruns.assign(deformation_converged=[0.2, 0.05, None] * 2)
 
+    def counts(**own: list) -> list[tuple[int, ...]]:
+        rows = (paid(reruns.assign(**own), by=name).iloc[0] for name in ("position", "both"))
+        return [(row.scenes, row.accurate, row.heldout, row.accurate_heldout) for row in rows]
 
-def test_no_run_is_judged_by_a_reference_whose_error_exceeds_a_third_of_the_limit():
-    """Of scene b the positions are known well enough, of c nothing is known, nor of a kicked."""
-    reruns = tables([(scene, "deim", 0.01, 2.0, 0.01) for scene in "abc"])
-    own = {"reference_error": [0.033, 0.033, None, 0.034, 0.033, None]}
-    reruns = reruns.assign(**own, reference_deformation_error=[0.033, 0.034, None] * 2)
-    position, both = (paid(reruns, measure=name).iloc[0] for name in ("position", "both"))
-    assert (position.scenes, position.heldout) == (2, 1)
-    assert (both.scenes, both.heldout) == (1, 0)
+    assert counts() == [(3, 3, 3, 3), (3, 2, 3, 2)]
+    own = [0.033, 0.034, None, 0.034, 0.0, 0.0]
+    assert counts(reference_error=own) == [(1, 1, 0, 0), (1, 0, 0, 0)]
+    own = [0.033, 0.05, None] * 2
+    assert counts(reference_deformation_error=own) == [(3, 3, 3, 3), (2, 1, 2, 1)]
 
 
 NO_RUNS = pd.DataFrame(columns=["scene", "perturbation", "frame", "relative_difference"])
@@ -222,7 +214,6 @@ def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_p
 
 
 def test_fewer_iterations_are_the_first_opponent_and_groups_without_force_do_not_count():
-    """Runs with the scene's ten iterations or more are no opponents."""
     fewer = [("a", 2, 0.2, 1.0), ("a", 5, 0.05, 2.0), ("b", 2, 0.3, 1.0), ("b", 10, 0.01, 4.0)]
     early = [(scene, "fom", "full", *rest) for scene, *rest in fewer]
     early += [(scene, "full", "full", 10, 0.01, ms) for scene, ms in (("a", 6.0), ("b", 4.0))]
