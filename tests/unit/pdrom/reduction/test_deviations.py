@@ -88,23 +88,6 @@ def test_energy_drift_of_a_run_that_stands_still():
     assert found["energy_drift"] > 0.1
 
 
-def test_first_contact_is_late_missed_or_should_not_be():
-    """Late by the frames that a run is behind; vertices that touch at the start do not count."""
-    measure = yardstick(FLOOR)
-    for late in (3, -3):
-        frames = np.clip(np.arange(FRAMES + 1) - late, 0, FRAMES)
-        delay = errors(measure, measure.reference[frames])["contact_delay"]
-        assert delay == pytest.approx(late * measure.scene.config.time_step)
-    start = measure.reference[:1].repeat(FRAMES + 1, axis=0)
-    assert errors(measure, start)["contact_delay"] == np.inf
-    still = Yardstick(measure.scene, start)
-    assert errors(still, measure.reference)["contact_delay"] == -np.inf
-    assert errors(still, start)["contact_delay"] is None
-    assert errors(yardstick(), measure.reference)["contact_delay"] is None
-    lying = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
-    assert not yardstick({"effect": "floor", "height": 2.0}, mesh=lying).series["contact"].any()
-
-
 def test_blocks_of_frames_do_not_matter(monkeypatch):
     measure = yardstick(FLOOR)
     positions = measure.reference + np.random.default_rng(1).normal(

@@ -21,6 +21,8 @@ SCENE, GROUP, METHOD = "strain_oop", "strain", "block-deim"
 RULES = [
     ("mesh", {}),
     ("fom", {"scene": SCENE}),
+    ("sensitivity", {"scene": SCENE}),
+    ("references", {"scene": SCENE}),
     ("snapshots", {"scene": SCENE, "group": GROUP}),
     ("pod", {"scene": SCENE, "group": GROUP}),
     ("reruns", {"scene": SCENE, "group": GROUP, "method": METHOD}),

@@ -52,11 +52,11 @@ def test_singular_values_with_their_share_and_round_off(tmp_path):
 
 NOT_TIMED = pd.DataFrame(columns=["scene", "ms_per_frame"])  # table frame_times without rows
 DISPLACEMENT = np.array([1.0, 2.0, 3.0, 4.0])
-ENERGY, CONTACT = [1.0, 0.9], np.array([0, 0, 1, 1], dtype=np.uint8)
+ENERGY = [1.0, 0.9]
 STEP = DISPLACEMENT / 2.0  # of the velocities; their differences are thrice those of the positions
 UNITS = {"rest_norm": 1.0, "time_step": 0.1}
 SERIES = {
-    "displacement": DISPLACEMENT, "step": STEP, "energy": ENERGY, "contact": CONTACT,
+    "displacement": DISPLACEMENT, "step": STEP, "energy": ENERGY,
     "deformed": DISPLACEMENT / 5.0, "displacement_converged": 2.0 * DISPLACEMENT,
     "deformed_converged": DISPLACEMENT / 5.0,
 }  # fmt: skip
@@ -71,12 +71,12 @@ def each(place: paths.Place, found: list[str]) -> list[File]:
 
 
 def store_series(run, difference):
-    """Series of a run with these differences; it touches the floor at once."""
+    """Series of a run with these differences."""
     for name, position, shape in (("", 1.0, 0.1), ("_converged", 4.0, 0.2)):
         run[f"difference{name}"] = np.multiply(difference, position)
         run[f"shape_difference{name}"] = np.multiply(difference, shape)
     run["step_difference"] = np.multiply(difference, 3.0)
-    run["energy"], run["contact"] = [1.0, 0.7], np.ones(len(difference), dtype=np.uint8)
+    run["energy"] = [1.0, 0.7]
 
 
 @pytest.fixture
