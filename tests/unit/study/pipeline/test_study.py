@@ -91,6 +91,7 @@ def test_what_no_subspace_takes_has_all_but_what_is_of_a_subspace(root):
     }
     assert without == {
         paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
+        paths.ERROR_BUDGET,
     }  # fmt: skip
 
 
