@@ -170,25 +170,6 @@ def test_a_configuration_without_references_and_options_that_clash_are_refused(r
             verify(words)
 
 
-def test_an_update_writes_every_table_and_notes_the_reason(results, subject, monkeypatch):
-    monkeypatch.setattr("study.verification.command.faults", lambda *_: {})
-    folder = folder_of(RESULTS)
-    before = {path.name: path.read_bytes() for path in folder.glob("*.csv*")}
-    (folder / "ladder.csv").unlink()
-    (folder / "of_an_older_version.csv.xz").touch()
-    assert [update(subject, why) for why in (" a new\n method ", "second")] == [folder] * 2
-    assert re.search(r"\): a new method\n- .*\): second\n$", (folder / LOG).read_text("utf-8"))
-    (folder / LOG).unlink()
-    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
-
-
-def test_tables_that_a_run_would_make_again_are_not_expected(results, subject):
-    """No job of this plan has written the tables at hand."""
-    with pytest.raises(StorageError, match=r"results/.*: settings or code have changed; run"):
-        update(subject, "a new method")
-    assert not (folder_of(RESULTS) / LOG).exists()
-
-
 def test_a_figure_is_drawn_again_to_the_byte(results, subject):
     """Replaced, with new checksums, by a figure that its table does not give, or another's."""
     job = subject.plan.job(declarations()["local_share"])
