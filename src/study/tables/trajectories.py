@@ -9,7 +9,15 @@ from study.artifact.paths import File
 from study.artifact.reads import Every
 from study.experiments.error_budget import FULL_ORDER, PARTS, SPAN
 from study.tables.kit.declaration import flag, integer, number, shared, table, text
-from study.tables.kit.results import CONVERGED, DEFORMATION, REFERENCE, TRAIN, joined
+from study.tables.kit.results import (
+    CONVERGED,
+    DEFORMATION,
+    OWN_ERRORS,
+    REFERENCE,
+    THIRD,
+    TRAIN,
+    joined,
+)
 
 MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIONS)}")
 
@@ -62,11 +70,12 @@ def test_trajectories(references: list[File]) -> pd.DataFrame:
         number("error", "position error"),
         *shared("deformation_error"),
         number("added", "deformation error less that of the part before", compared="error"),
-        flag("largest", "the part adds most", compared="error"),
+        flag("largest", "the part adds most, and more than 3 x the reference's own error"),
+        *shared("reference_error reference_deformation_error"),
     ),
-    reads={"parts": Every(paths.ERROR_BUDGET)},
+    reads={"parts": Every(paths.ERROR_BUDGET), "references": Every(paths.REFERENCES)},
 )
-def error_budget(parts: list[File]) -> pd.DataFrame:
+def error_budget(parts: list[File], references: list[File]) -> pd.DataFrame:
     """One row per test trajectory, model and part; parts of a reduced model follow one another.
 
     Where the reference moves rigidly, ``added`` is that of the position error.
@@ -80,4 +89,8 @@ def error_budget(parts: list[File]) -> pd.DataFrame:
     with np.errstate(invalid="ignore"):
         added = (error - before).where(own)
     trajectory = pd.Series(np.arange(len(rows)) // len(PARTS), rows.index)
-    return rows.assign(added=added, largest=added == added.groupby(trajectory).transform("max"))
+    most = added == added.groupby(trajectory).transform("max")
+    known = joined(references)[["scene", "motion", *OWN_ERRORS]]
+    rows = rows.assign(added=added).merge(known, "left", ["scene", "motion"])
+    least = rows.reference_deformation_error.fillna(rows.reference_error) / THIRD
+    return rows.assign(largest=most & (rows.added > least))
