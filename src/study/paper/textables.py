@@ -419,8 +419,7 @@ TEX_TABLES: dict[str, Callable[..., Rows]] = {
     f"tab_{make.__name__}": make
     for make in (
         claims, claims_in_full, scenes, methods, ranks, reruns, local_share, stability, iterations,
-        positions, break_even, speedups, payoff, pays,
-        training,
+        positions, break_even, speedups, payoff, pays, training, trajectories, error_budget,
     )
 }  # fmt: skip
 

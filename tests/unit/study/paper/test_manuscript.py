@@ -14,6 +14,7 @@ from study.paper.build import bibliography, paper
 from study.paper.macros import keys_of, number_of, sentences
 from study.paper.source import documents, figure_numbers
 from study.paper.tex import build_pdfs, packages_of
+from study.paper.textables import TEX_TABLES
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study
 from study.tables import declared
@@ -130,7 +131,8 @@ def test_every_figure_of_the_study_is_shown_or_named_and_the_text_speaks_of_what
     assert set(shown) <= set(re.findall(r"\\ref\{fig:([a-z_]+)\}", SOURCE))
 
 
-def test_the_text_speaks_of_every_table():
+def test_every_table_is_included_and_the_text_speaks_of_it():
+    assert sorted(re.findall(r"tab_\w+", SOURCE)) == sorted(TEX_TABLES)
     labels = re.findall(r"\\label\{(tab:[a-z]+)\}|\\longtableof\{.*?\}\{(tab:[a-z]+)\}", SOURCE)
     shown = {one or other for one, other in labels}
     assert shown == set(re.findall(r"\\ref\{(tab:[a-z]+)\}", SOURCE)) != set()
