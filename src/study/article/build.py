@@ -112,12 +112,9 @@ PARTS = {"published": "As published", "beyond": "Beyond"}
 
 
 def claims_page(
-    claims: Mapping[str, ClaimRule],
-    tests: pd.DataFrame,
-    verdicts: pd.DataFrame,
-    pages: Mapping[str, str],
-    template: str,
-) -> str:
+    claims: Mapping[str, ClaimRule], tests: pd.DataFrame, verdicts: pd.DataFrame,
+    pages: Mapping[str, str], template: str,
+) -> str:  # fmt: skip
     """HTML page of all ``claims`` (rules by name), with their tests and verdicts.
 
     pages : file name of the page with each figure, by the figure's name
@@ -213,20 +210,10 @@ _PREFIX = re.compile(r"\\renewcommand\{?\\thefigure\}?\{([A-Z]+)")
 
 
 def write_article(
-    source: list[Path],
-    references: Path,
-    tables: list[File],
-    machine: File,
-    inputs: list[File],
-    figures: list[File],
-    pictures: list[File],
-    facts: Facts,
-    claims: Path,
-    added: Added,
-    made: list[str],
-    outputs: Mapping[str, str],
-    **assets: Path,
-) -> None:
+    source: list[Path], references: Path, tables: list[File], machine: File, inputs: list[File],
+    figures: list[File], pictures: list[File], facts: Facts, claims: Path, added: Added,
+    made: list[str], outputs: Mapping[str, str], **assets: Path,
+) -> None:  # fmt: skip
     """Write all pages of the article to ``outputs`` (name of a page or file -> path).
 
     inputs : generated files that the manuscript includes; numbers.json: table cells of its numbers

@@ -146,12 +146,9 @@ def _scene_looks(table: pd.DataFrame) -> dict[str, tuple[str, str]]:
 
 
 def _draw_quantity(
-    ax: Axes,
-    table: pd.DataFrame,
-    rungs: list[tuple[str, str]],
-    columns: tuple[str, str, str],
+    ax: Axes, table: pd.DataFrame, rungs: list[tuple[str, str]], columns: tuple[str, str, str],
     limits: tuple[float, float],
-) -> None:
+) -> None:  # fmt: skip
     ax.set(xscale="log", xlim=(limits[0], limits[1] * 1.3))
     ax.grid(True)
     scenes = _scene_looks(table)

@@ -54,14 +54,9 @@ class Facts(BaseModel):
 
 
 def write_inputs(
-    source: list[Path],
-    references: Path,
-    tables: list[File],
-    machine: File,
-    facts: Facts,
-    made: list[str],
-    outputs: Mapping[str, str],
-) -> None:
+    source: list[Path], references: Path, tables: list[File], machine: File, facts: Facts,
+    made: list[str], outputs: Mapping[str, str],
+) -> None:  # fmt: skip
     r"""Write macros.tex, figures.tex, TeX tables, bibliographies and the file `NUMBERS`.
 
     ``made`` are the rules of all tables, figures and pages. `NUMBERS` (JSON) has the table cells
@@ -140,12 +135,9 @@ def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
 
 
 def build(
-    source: list[Path],
-    figures: list[File],
-    inputs: list[File],
-    facts: Facts,
+    source: list[Path], figures: list[File], inputs: list[File], facts: Facts,
     outputs: Mapping[str, str],
-) -> None:
+) -> None:  # fmt: skip
     """Build the PDFs of paper and supplement, which include what `write_inputs` has made."""
     results = [Path(file.path) for file in (*figures, *inputs)]
     for path in results:

@@ -233,17 +233,10 @@ class Declaration(Artifact):
 
 
 def figure(
-    *,
-    title: str,
-    reads: Mapping[str, Read],
-    number: int | None = None,
-    more: str = "",
-    scenes: str = "",
-    methods: str = "",
-    groups: str = "",
-    several: bool = False,
+    *, title: str, reads: Mapping[str, Read], number: int | None = None, more: str = "",
+    scenes: str = "", methods: str = "", groups: str = "", several: bool = False,
     timed: bool = False,
-) -> Callable[[Callable[..., Figure]], Declaration]:
+) -> Callable[[Callable[..., Figure]], Declaration]:  # fmt: skip
     """Return a decorator that declares a function as the drawing of a figure.
 
     The function gets the inputs ``reads``. If it has a parameter ``drawn``, it gets what the figure

@@ -79,13 +79,9 @@ class ElementMap:
         return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
 
     def draw(
-        self,
-        ax: Axes,
-        points: np.ndarray,
-        values: np.ndarray,
-        camera: Camera,
+        self, ax: Axes, points: np.ndarray, values: np.ndarray, camera: Camera,
         colours: ScalarMappable,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Draw the mesh at ``points`` (N, 3) m, elements coloured by ``values`` (e,)."""
         if self.kind == "edge" and not len(self.mesh.tetrahedra):
             draw_surface(
