@@ -6,7 +6,6 @@ unstable rows, which rounding errors decide, changed cells are counted.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
