@@ -11,12 +11,12 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 35_300,
-    "lines of tests": 22_700,
-    "words of documentation": 25_000,
-    "tables": 24,
-    "figures": 22,
-    "experiments": 18,
+    "lines of src": 35_400,
+    "lines of tests": 22_800,
+    "words of documentation": 25_200,
+    "tables": 27,
+    "figures": 24,
+    "experiments": 20,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")
 
