@@ -176,10 +176,7 @@ def one_line() -> Iterator[None]:
 
 def remember(command: CommandLine) -> None:
     """Write the configuration options of ``command``, which is about to run, to file `RECORD`."""
-    # not imported at the top: it loads NumPy, and environment variables must be set before
-    from pdrom.core.store import write_text
-
-    write_text(json.dumps(command.configuration) + "\n", RECORD)
+    RECORD.write_text(json.dumps(command.configuration), encoding="utf-8")
 
 
 def recall() -> list[str]:

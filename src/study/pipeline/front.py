@@ -1,9 +1,7 @@
 """``./reproduce ARGS...``: Snakemake with the options, target names and messages of this project.
 
-``python -m study.pipeline.front`` completes the arguments, checks the configuration files, and then
-does what the console command ``snakemake`` does. Some first arguments are special: ``verify``
-compares results with the expected ones; ``bundle`` writes an archive; ``test`` passes the other
-arguments to pytest; ``run`` starts a program found on PATH, such as pdrom.
+It completes the arguments, checks the configuration files, and then does what ``snakemake`` does,
+unless the first argument is a key of `HANDED_ON`.
 """
 
 import os

@@ -14,7 +14,6 @@ from snakemake.scheduling.job_scheduler import JobScheduler
 from pdrom.core.errors import ConfigurationError, PdromError, StorageError
 from pdrom.core.store import read_table, write_text
 from pdrom.core.store.checksum import move_aside
-from pdrom.model.compiled.functions import are_compiled
 from study.artifact import planned
 from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, remember
@@ -102,8 +101,6 @@ class Run:
         # With a limit on the rate of starts, each selection of jobs starts a timer, which selects
         # again: at the end of a run, timers use a third of a core, and the process waits for them.
         workflow.scheduler.job_rate_limiter = None
-        if not are_compiled():
-            sys.stderr.write("pdrom: the first jobs compile kernels (once, about half a minute)\n")
         tell_expectation(workflow, plan)
         with one_line():
             write_text(json.dumps(planned.plan()), planned.PLAN, with_checksum=False)

@@ -28,7 +28,7 @@ def blocked(error: OSError) -> str:
 def hold() -> int:
     """Lock the working directory until the process ends; return the descriptor of the lock file.
 
-    Raises PdromError if the lock is unusable or held by another process (named in the message).
+    Raises PdromError if another process holds the lock (named in the message), or OSError.
     """
     try:
         FOLDER.mkdir(exist_ok=True)
@@ -36,7 +36,6 @@ def hold() -> int:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         if SNAKEMAKE_LOCKS.is_dir():
             shutil.rmtree(SNAKEMAKE_LOCKS)
-        SNAKEMAKE_LOCKS.unlink(missing_ok=True)
     except BlockingIOError:
         holder = os.read(descriptor, 300).decode(errors="replace").strip()
         os.close(descriptor)
@@ -44,8 +43,6 @@ def hold() -> int:
             f"another run ({holder or 'just started'}) is at work in this folder; wait for its "
             "end, -n works meanwhile"
         ) from None
-    except OSError as error:
-        raise PdromError(f"{LOCK}: cannot be written or locked; {blocked(error)}") from error
     os.ftruncate(descriptor, 0)
     os.write(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
     return descriptor

@@ -44,12 +44,6 @@ def _mark(function):
     function.__qualname__ += f"_{_checksum(Path(function.__code__.co_filename).parent)}"
 
 
-def are_compiled() -> bool:
-    """Return whether a cache folder, if one is set, has code of the step loop's present text."""
-    folder, files = os.environ.get("NUMBA_CACHE_DIR"), f"*_{_checksum(MODEL / 'dynamics')}-*.nbi"
-    return folder is None or any(Path(folder).glob(f"dynamics*/{files}"))
-
-
 class _Cache(FunctionCache):  # type: ignore[misc]
     """Cache on disk: of several processes, one compiles a function and the others wait for it."""
 

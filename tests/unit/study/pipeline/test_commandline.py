@@ -8,6 +8,7 @@ from study.paper.source import figure_numbers
 from study.pipeline.commandline import (
     LINES,
     OPTIONS,
+    RECORD,
     CommandLine,
     completed,
     recall,
@@ -195,6 +196,7 @@ def test_what_does_not_exist_is_named_with_what_there_is(asked, parts):
 def test_the_report_is_of_the_last_run():
     assert completed(["--report"]) == ["--report", "--cores", "all", *OPTIONS]
     last = ["--configfile", "my.yaml", "--config", "a1=b", "c1=d"]
+    RECORD.parent.mkdir()
     remember(CommandLine(last))
     assert recall() == last
     assert completed(["--report"]) == ["--report", *last, "--cores", "all", *OPTIONS]

@@ -65,20 +65,6 @@ def test_a_lock_is_not_inherited_by_jobs():
         job.communicate(b"\n")
 
 
-def test_what_stands_in_place_of_a_lock_is_named_or_goes(folder):
-    (folder / ".snakemake").write_text("a file where the folder should be")
-    with pytest.raises(PdromError, match=r"run\.lock: cannot be .*\.snakemake: .* remove what"):
-        running.hold()
-    (folder / ".snakemake").unlink()
-    running.LOCK.mkdir(parents=True)
-    with pytest.raises(PdromError, match=r"run\.lock: Is a directory; remove what stands there"):
-        running.hold()
-    running.LOCK.rmdir()
-    running.SNAKEMAKE_LOCKS.touch()
-    os.close(running.hold())
-    assert not running.SNAKEMAKE_LOCKS.exists()
-
-
 LEAVES = """
 import os
 from study.pipeline.signals import *
