@@ -101,6 +101,7 @@ class Run:
         # With a limit on the rate of starts, each selection of jobs starts a timer, which selects
         # again: at the end of a run, timers use a third of a core, and the process waits for them.
         workflow.scheduler.job_rate_limiter = None
+        memory().save()  # a signal ends a run at once
         tell_expectation(workflow, plan)
         with one_line():
             write_text(json.dumps(planned.plan()), planned.PLAN, with_checksum=False)
