@@ -364,7 +364,7 @@ OTHER_CASES = [
            "'nowhere'"),
     ladder("ladder of too many signs", "signs: 5", "signs: 5000", "ladder.signs = 5000"),
     ladder("rung that contradicts itself", "rows: element\n    solve: qr",
-           "rows: element\n    solve: square", "ladder.up.6", "allowed are qr, tikhonov"),
+           "rows: element\n    solve: square", "ladder.up.5", "allowed are qr, tikhonov"),
 ]  # fmt: skip
 
 CASES = STUDY_CASES + SCENE_CASES + MESH_CASES + OTHER_CASES
