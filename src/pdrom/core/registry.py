@@ -4,36 +4,23 @@ A registry maps each name to a text ``"package.module:attribute"``. The module i
 the name is used.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, choices
 
 
-class Registry(Mapping[str, str]):
-    """Read-only map from a name to its implementation, given as "module:attribute"."""
+class Registry(dict[str, str]):
+    """Map from a name to its implementation, given as "module:attribute"."""
 
     def __init__(self, kind: str, entries: Mapping[str, str]) -> None:
         """Store ``entries`` (name -> "module:Class"); ``kind`` names an entry in error messages."""
+        super().__init__(entries)
         self.kind = kind
-        self._entries = dict(entries)
 
-    def __getitem__(self, name: str) -> str:
-        try:
-            return self._entries[name]
-        except KeyError:
-            allowed = choices(name, sorted(self._entries))
-            raise ConfigurationError(f"unknown {self.kind} '{name}'{allowed}") from None
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._entries
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._entries)
-
-    def __len__(self) -> int:
-        return len(self._entries)
+    def __missing__(self, name: str) -> str:
+        raise ConfigurationError(f"unknown {self.kind} '{name}'{choices(name, sorted(self))}")
 
     def module(self, name: str) -> str:
         """Name of the module that implements ``name``; ConfigurationError for an unknown name."""

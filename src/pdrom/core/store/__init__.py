@@ -61,9 +61,8 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
         yield temporary
         _bring_to_disk(temporary)
         if with_checksum:
-            checksum.write_bytes(
-                sums.new_checksum(sums.digest_of(temporary), target.name, target).content
-            )
+            made = sums.new_checksum(sums.digest_of(temporary), target.name, target)
+            checksum.write_bytes(made.content)
             _bring_to_disk(checksum)
             _rename(temporary, checksum, target)
         else:
@@ -92,7 +91,6 @@ def require_own(path: str | os.PathLike[str]) -> None:
     if not above.is_dir() or not os.access(above, os.W_OK | os.X_OK):
         fault = "no permission to write" if above.is_dir() else "not a folder"
         raise StorageError(f"{target}: cannot be written ({above}: {fault})")
-
     if not target.is_file():
         return
     hdf5 = sums.is_hdf5(target)
@@ -102,9 +100,8 @@ def require_own(path: str | os.PathLike[str]) -> None:
         begin = handle.read(MARKED)
         handle.seek(max(0, target.stat().st_size - MARKED))
         if MARK not in begin and MARK not in handle.read():
-            raise StorageError(
-                f"{target}: cannot be written (a file that pdrom has not made; move it away)"
-            )
+            fault = "a file that pdrom has not made; move it away"
+            raise StorageError(f"{target}: cannot be written ({fault})")
 
 
 def _require_file(target: Path) -> None:
@@ -133,10 +130,8 @@ def _remove_leftovers(target: Path) -> None:
 def _runs(process: int) -> bool:
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # the process exists, but belongs to another user
-        pass
+    except OSError as error:  # PermissionError: the process exists, but belongs to another user
+        return isinstance(error, PermissionError)
     return True
 
 
