@@ -320,24 +320,24 @@ class Loop:
 
 def require_same_mesh(own: Scene, other: Scene) -> None:
     """Raise ConfigurationError if ``other`` has another mesh or other groups than ``own``."""
-    for name in ("points", "triangles", "tetrahedra"):
-        if not np.array_equal(getattr(own.mesh, name), getattr(other.mesh, name)):
-            fault = f"another mesh than that of the training ({own.mesh.vertices} vertices)"
-            raise ConfigurationError(f"scene '{other.config.name}': {fault}")
     wanted, found = (
         {e.effect: e.model_dump(exclude={"weight", "factors"})
          for e in scene.config.effects if isinstance(e, GroupConfig)}
         for scene in (own, other)
     )  # fmt: skip
-    fault = ""
+    faults = [
+        f"{name}.{key} = {found[name][key]}; the training has {value}"
+        for name, keys in wanted.items()
+        for key, value in keys.items()
+        if name in found and found[name][key] != value
+    ]
     if set(wanted) != set(found):
-        fault = f"groups {', '.join(found)}; the training has {', '.join(wanted)}"
-    for name in {} if fault else wanted:
-        for key, value in wanted[name].items():
-            if found[name][key] != value:
-                fault = f"{name}.{key} = {found[name][key]}; the training has {value}"
-    if fault:
-        raise ConfigurationError(f"scene '{other.config.name}': {fault}")
+        faults.append(f"groups {', '.join(found)}; the training has {', '.join(wanted)}")
+    for name in ("points", "triangles", "tetrahedra"):
+        if not np.array_equal(getattr(own.mesh, name), getattr(other.mesh, name)):
+            faults += [f"another mesh than that of the training ({own.mesh.vertices} vertices)"]
+    if faults:
+        raise ConfigurationError(f"scene '{other.config.name}': {faults[-1]}")
 
 
 def worst_errors(validation: pd.DataFrame) -> list[float]:

@@ -117,9 +117,8 @@ def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:
         ``full`` is no run; the method or group is unknown; snapshots are too few or not finite.
     """
     files.require_run(full, "full")
-    chosen = full.scene.group(
-        files.require(str, group, "group", source="the name of a constraint group")
-    )
+    files.require(str, group, "group", source="the name of a constraint group")
+    chosen = full.scene.group(group)
     spec = method_spec(method)
     if group not in full.snapshots:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")

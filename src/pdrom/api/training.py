@@ -16,7 +16,7 @@ from pdrom.api.records import FULL, Run
 from pdrom.api.runs import group_of, method_spec, projections_model, run
 from pdrom.core.errors import ConfigurationError, NotReducibleError, SnapshotError
 from pdrom.core.store import require_finite
-from pdrom.core.yamlfile import ConfigModel, shown
+from pdrom.core.yamlfile import ConfigModel, keys_of, shown
 from pdrom.core.yamlfile import validate as checked
 from pdrom.model.mesh.selection import Selection, select_vertices
 from pdrom.model.runs import converged_run
@@ -63,7 +63,7 @@ def arguments(scene: Scene, given: Mapping[str, Any]) -> Arguments:
 
     Raises the errors of `train`; an argument that another one makes meaningless is one of them.
     """
-    names = [field.alias or name for name, field in Arguments.model_fields.items()]
+    names = keys_of(Arguments)
     plain = {key: v.item() if isinstance(v := given[key], np.generic) else v for key in names}
     asked, basis, method = checked(Arguments, plain, "train"), given.get("basis"), given["method"]
     own, usual = (a.model_dump(by_alias=True) for a in (asked, Arguments()))
@@ -74,10 +74,7 @@ def arguments(scene: Scene, given: Mapping[str, Any]) -> Arguments:
     apart = {
         "with group or method": (local, changed - {"group", "r", "validate"}),
         "without group or method": (not local, changed & {"r"}),
-        "with error, which tries 20, 40 and 80 modes": (
-            asked.error is not None,
-            changed & {"modes"},
-        ),
+        "with error, which tries 20, 40 and 80 modes": (bool(asked.error), changed & {"modes"}),
         "with an own basis": (basis is not None, changed & {"modes", "error"}),
         "with tolerance None": (asked.tolerance is None, changed & {"selection"}),
     }

@@ -34,11 +34,7 @@ class Progress:
         full, ms = WIDTH * done // self._frames, 1e3 * float(report.seconds.sum())
         bar = "#" * full + "." * (WIDTH - full)
         text = f"frame {done} of {self._frames}, {ms:.2f} ms a frame, {left:.0f} s left"
-        self._show(f"{self._name} [{bar}] {text}", now)
-        if done == self._frames and self._terminal:
-            self._stream.write("\n")
-
-    def _show(self, text: str, now: float) -> None:
-        self._shown = now
-        self._stream.write(f"\r{text:<{3 * WIDTH}}  " if self._terminal else f"{text}\n")
+        line, end = f"{self._name} [{bar}] {text}", "\n" * (done == self._frames)
+        self._stream.write(f"\r{line:<{3 * WIDTH}}  {end}" if self._terminal else f"{line}\n")
         self._stream.flush()
+        self._shown = now

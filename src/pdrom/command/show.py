@@ -68,6 +68,7 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
     import h5py
 
     from pdrom.core.errors import StorageError
+    from pdrom.core.provenance import RECORD
 
     try:
         with h5py.File(path, "r") as file:
@@ -81,8 +82,6 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
     configuration = attributes.pop("configuration", None)
     if configuration is not None:
         yield from _configuration(json.loads(configuration), whole)
-    from pdrom.core.provenance import RECORD
-
     yield "attributes:"
     own = {k: v for k, v in attributes.items() if k not in RECORD}
     yield from (f"  {name}: {_short(value)}" for name, value in own.items())

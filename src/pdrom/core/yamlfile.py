@@ -153,8 +153,7 @@ def validate(model: type[M], data: Any, source: str) -> M:
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
     """Message about the first fault that ``model`` found, as ``key = value: what is required``."""
     # a misspelt required key causes two faults, unknown and missing: "missing" helps less, so last
-    faults = sorted(error.errors(), key=lambda fault: fault["type"] == "missing")
-    fault = faults[0]
+    fault = min(error.errors(), key=lambda fault: fault["type"] == "missing")
     location = fault["loc"]
     names = [str(part) for part in location if part != "constrained-int"]
     key = " ".join(".".join(names).split()) or model.__name__
@@ -209,11 +208,10 @@ def _inner_model(annotation: Any) -> type[BaseModel] | None:
 
 # Longest file name and longest path that operating systems accept, in bytes.
 MAX_NAME, MAX_PATH = 255, 4095
-_SCENE_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 
 
 def _scene_name(name: str) -> str:
-    if not _SCENE_NAME.fullmatch(name):
+    if not re.fullmatch("[a-z][a-z0-9_]{0,63}", name):
         raise ValueError(
             "a scene's name begins with a small letter and goes on with small letters, digits and "
             "underscores, 64 characters at most"

@@ -20,7 +20,6 @@ from pdrom.view.panels import Row, RunPanel, draw_rows, shared_window
 
 INSTANTS = (0.25, 0.5, 0.75, 1.0)  # times of the pictures, as fractions of the run
 CAMERA = Camera(30.0, 20.0)
-NO_LIMIT = 100.0  # inches, limit of the picture's height: practically none
 NAME, FRAMES = "frame_{:05d}.vtu", "frame_*.vtu"
 LABEL = 24  # characters of a line in the label of a row
 
@@ -62,7 +61,7 @@ def _draw(scene: ViewedScene) -> Figure:
         Row(label, scene.mesh, row, windows, full, CAMERA)
         for label, row in zip(labels, with_bodies, strict=True)
     ]
-    return draw_rows(rows, NO_LIMIT)
+    return draw_rows(rows, height_limit=np.inf)
 
 
 def _panel(number: int, run: ViewedRun, frame: int) -> RunPanel:

@@ -4,6 +4,7 @@ Of a run, a page has the surface vertices alone, in some of its frames, quantise
 
 import json
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -93,12 +94,7 @@ def safe_json(value: object) -> str:
 
 def filled(template: str, parts: dict[str, str]) -> str:
     """Replace each ``{{NAME}}`` in ``template`` by its entry of ``parts``, in a single pass."""
-    before, *rest = template.split("{{")
-    pieces = [before]
-    for piece in rest:
-        name, _, after = piece.partition("}}")
-        pieces += [parts[name.strip()], after]
-    return "".join(pieces)
+    return re.sub(r"\{\{(.+?)\}\}", lambda found: parts[found[1].strip()], template)
 
 
 EYE = np.array([0.85, 0.55, 1.45])  # direction to the viewer if y points up, else it is rotated
@@ -111,7 +107,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
     stride = max(1, ceil((len(scene.positions) - 1) / FRAMES))
     full = scene.positions[::stride, used]
     low, high = shown_region(full, scene.effects)
-    bodies = [effect.body(low, high) for effect in scene.effects]
+    bodies = [body for effect in scene.effects if (body := effect.body(low, high))]
     return {
         "name": scene.name,
         "title": scene.title,
@@ -128,7 +124,6 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
                 "triangles": pack_text(body.triangles.astype("<u4")),
             }
             for body in bodies
-            if body is not None
         ],
         "ms": scene.ms,
         "runs": [

@@ -81,14 +81,13 @@ def warnings_to(stream: TextIO | None, form: str = "pdrom: warning: %(message)s"
     handler = logging.NullHandler() if stream is None else logging.StreamHandler(stream)
     handler.setLevel(logging.WARNING)
     handler.setFormatter(logging.Formatter(form))
-    loggers = [logging.getLogger(name) for name in PACKAGES]
-    for logger in loggers:
-        logger.addHandler(handler)
+    for name in PACKAGES:
+        logging.getLogger(name).addHandler(handler)
     try:
         yield
     finally:
-        for logger in loggers:
-            logger.removeHandler(handler)
+        for name in PACKAGES:
+            logging.getLogger(name).removeHandler(handler)
 
 
 class Usage(NamedTuple):

@@ -69,7 +69,7 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             os.replace(temporary, target)
             place = checksum_path(target)
             content = place.read_bytes() if place.is_file() else b""
-            if content and sums.Checksum.parse(content).content == content:
+            if sums.Checksum.parse(content).content == content:
                 place.unlink()  # checksum of the file that was just replaced
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error

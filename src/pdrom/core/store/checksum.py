@@ -27,6 +27,7 @@ from pathlib import Path
 from pdrom.core.errors import StorageError, reason
 from pdrom.core.provenance import provenance
 
+# Whether a damaged result is renamed when read: inside the context `damaged_set_aside`.
 _ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=False)
 
 
@@ -43,11 +44,6 @@ def damaged_set_aside() -> Iterator[None]:
         yield
     finally:
         _ASIDE.reset(previous)
-
-
-def sets_aside() -> bool:
-    """Whether a damaged result is renamed when read: inside the context `damaged_set_aside`."""
-    return _ASIDE.get()
 
 
 CHECKSUM_SUFFIX = ".blake2b"
@@ -140,9 +136,7 @@ def read_checksum(path: str | os.PathLike[str]) -> Checksum | None:
     """Read the checksum of the file ``path``; None if it is missing, damaged or not readable."""
     path = Path(path)
     content = _checksum_bytes(path) if path.is_file() and os.access(path, os.R_OK) else None
-    if content is None:
-        return None
-    checksum = Checksum.parse(content)
+    checksum = Checksum.parse(content or b"")
     return checksum if checksum.content == content else None
 
 
@@ -185,10 +179,10 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
         condition = check_file(path)
     except StorageError as error:
         unusable = not path.is_file() or not os.access(path, os.R_OK)
-        if sets_aside() and unusable and os.path.lexists(path):
+        if _ASIDE.get() and unusable and os.path.lexists(path):
             raise _set_aside(path, "damaged, no file that can be read") from error
         raise
-    if condition is Condition.INTACT and sets_aside():
+    if condition is Condition.INTACT and _ASIDE.get():
         told = read_checksum(path)
         if told and told.file != os.path.normpath(path):
             other = told.file or "its checksum names none"
@@ -201,7 +195,7 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
         fault = "no checksum inside (written by an older pdrom, or by another program?)"
     else:
         fault = f"its checksum {checksum_path(path).name} is missing (copied without it?)"
-    if sets_aside():
+    if _ASIDE.get():
         raise _set_aside(path, fault if fault.startswith("damaged") else f"damaged, {fault}")
     way = f"; {UNCHECKED}" if condition is Condition.NO_CHECKSUM and is_hdf5(path) else ""
     raise StorageError(f"{path}: {fault}{way}")
@@ -225,7 +219,7 @@ def digest_told(path: str | os.PathLike[str]) -> str:
     A job of the workflow refuses another result, as `require_intact` does.
     """
     told = read_checksum(path)
-    if sets_aside() and (told is None or told.file != os.path.normpath(path)):
+    if _ASIDE.get() and (told is None or told.file != os.path.normpath(path)):
         require_intact(path)
     return told.digest if told else ""
 
