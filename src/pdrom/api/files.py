@@ -26,10 +26,7 @@ T = TypeVar("T")
 
 
 def require(kind: type[T], value: Any, name: str, source: str) -> T:
-    """Return ``value`` if it is of the type ``kind``, else raise ConfigurationError.
-
-    The error names the argument (``name``) and tells what makes such a value (``source``).
-    """
+    """Return ``value``, or raise ConfigurationError if it is no ``kind``, as ``source`` makes."""
     if isinstance(value, kind):
         return value
     fault = f"a {kind.__name__} is required ({source})"

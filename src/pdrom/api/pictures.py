@@ -109,16 +109,10 @@ def _viewed(runs: list[Run]) -> ViewedScene:
     first = next((run for run in runs if run.full_order), runs[0])
     config = first.scene.config
     return ViewedScene(
-        name=config.name,
-        title=config.title,
-        mesh=first.scene.mesh,
-        time_step=config.time_step,
-        positions=first.positions,
-        ms=float(np.median(first.ms)),
-        runs=tuple(_shown(run, first) for run in runs if run is not first),
-        effects=config.effects,
-        method=first.method,
-    )
+        name=config.name, title=config.title, mesh=first.scene.mesh, time_step=config.time_step,
+        positions=first.positions, ms=float(np.median(first.ms)), effects=config.effects,
+        runs=tuple(_shown(run, first) for run in runs if run is not first), method=first.method,
+    )  # fmt: skip
 
 
 def _shown(run: Run, reference: Run) -> ViewedRun:

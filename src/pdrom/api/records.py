@@ -141,12 +141,8 @@ class Run:
     def error(self, reference: "Run") -> Errors:
         """Errors of the positions and of the deformation against ``reference``, over all frames.
 
-        Both are None if one of the runs blew up.
-
-        Raises
-        ------
-        ConfigurationError
-            ``reference`` has another mesh, time step or number of frames.
+        Both are None if one of the runs blew up. ConfigurationError if ``reference`` has another
+        mesh, time step or number of frames.
         """
         self.require_comparable(reference)
         if self.blowup_frame is not None or reference.blowup_frame is not None:

@@ -46,10 +46,7 @@ def files_of(file: str, scene: "Scene") -> list[str]:
 
 
 def require_output(path: str | Path, reads: Sequence[str]) -> None:
-    """Check, before a long computation, that the output ``path`` can be written.
-
-    Raises StorageError if `require_own` does, or if the command ``reads`` this file.
-    """
+    """Check that the output ``path`` is none of the files ``reads``, and with `require_own`."""
     from pdrom.core.errors import StorageError
     from pdrom.core.store import require_own
 

@@ -52,11 +52,7 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 
 def template(
-    stem: str,
-    file: str | None = None,
-    mesh: "Mesh | None" = None,
-    up: str = "y",
-    merge: float = 0.0,
+    stem: str, file: str | None = None, mesh: "Mesh | None" = None, up: str = "y", merge: float = 0
 ) -> str:
     """Text of a scene file; the scene has a generated sheet, or the ``mesh`` read from ``file``.
 

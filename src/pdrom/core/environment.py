@@ -12,6 +12,7 @@ processors (docs/decisions/0015-one-target.md). All variables must be set before
 
 import os
 import platform
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -54,13 +55,9 @@ def settled(
         if name in (*KEPT, *asked) or not name.startswith(CLEARED)
     }
     fixed = {
-        **dict.fromkeys(THREADS, "1"),
-        "PYTHONHASHSEED": "0",
-        "MPLBACKEND": "Agg",
-        "LC_ALL": "C.UTF-8",
-        "SOURCE_DATE_EPOCH": DATE,
-        "FORCE_SOURCE_DATE": "1",
-    }
+        **dict.fromkeys(THREADS, "1"), "PYTHONHASHSEED": "0", "MPLBACKEND": "Agg",
+        "LC_ALL": "C.UTF-8", "SOURCE_DATE_EPOCH": DATE, "FORCE_SOURCE_DATE": "1",
+    }  # fmt: skip
     if kernels:
         fixed["OPENBLAS_CORETYPE"] = kernels
     if TARGET not in asked:  # FEATURES in ``target`` would not fit the user's TARGET
@@ -107,12 +104,8 @@ def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
 
 def processor_features(cpuinfo: str) -> set[str]:
     """Flags that all processors in ``cpuinfo`` (text of /proc/cpuinfo) share; may be empty."""
-    flags = [
-        set(line.partition(":")[2].split())
-        for line in cpuinfo.splitlines()
-        if line.partition(":")[0].strip() in ("flags", "Features")
-    ]
-    return set.intersection(*flags) if flags else set()
+    flags = re.findall(r"^\s*(?:flags|Features)\s*:(.*)", cpuinfo, re.MULTILINE)
+    return set.intersection(*(set(line.split()) for line in flags)) if flags else set()
 
 
 def features_here() -> set[str]:

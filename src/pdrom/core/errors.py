@@ -37,9 +37,7 @@ class PdromError(Exception):
 
     def __str__(self) -> str:
         text = re.sub(r"(\S{80})\S{920,}", r"\1...", super().__str__())
-        return "".join(
-            character if character.isprintable() else ascii(character)[1:-1] for character in text
-        )
+        return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 class ConfigurationError(PdromError):

@@ -55,17 +55,11 @@ def machine() -> Machine:
     """Record of this machine and this process."""
     kernels = loaded_kernels()
     return Machine(
-        cpu=_cpu_model(),
-        cores=os.cpu_count(),
-        system=f"{platform.system()} {platform.machine()}",
-        python=platform.python_version(),
-        pdrom=__version__,
-        commit=_commit(),
-        threads=max((each.threads for each in kernels), default=1),
-        libraries=library_versions(),
-        kernels=kernels,
-        target=os.environ.get("NUMBA_CPU_NAME", ""),
-    )
+        cpu=_cpu_model(), cores=os.cpu_count(), python=platform.python_version(),
+        system=f"{platform.system()} {platform.machine()}", pdrom=__version__, commit=_commit(),
+        threads=max((each.threads for each in kernels), default=1), libraries=library_versions(),
+        kernels=kernels, target=os.environ.get("NUMBA_CPU_NAME", ""),
+    )  # fmt: skip
 
 
 def loaded_kernels() -> tuple[Kernels, ...]:
@@ -74,15 +68,12 @@ def loaded_kernels() -> tuple[Kernels, ...]:
         import_module(module)
     found = [
         Kernels(
-            file=Path(pool["filepath"]).name,
-            kind=pool["user_api"],
-            library=pool["internal_api"],
-            version=pool["version"],
-            architecture=pool.get("architecture"),
+            file=Path(pool["filepath"]).name, kind=pool["user_api"], library=pool["internal_api"],
+            version=pool["version"], architecture=pool.get("architecture"),
             threads=pool["num_threads"],
         )
         for pool in threadpool_info()
-    ]
+    ]  # fmt: skip
     return tuple(sorted(found, key=lambda each: each.file))
 
 

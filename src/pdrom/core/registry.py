@@ -22,10 +22,6 @@ class Registry(dict[str, str]):
     def __missing__(self, name: str) -> str:
         raise ConfigurationError(f"unknown {self.kind} '{name}'{choices(name, sorted(self))}")
 
-    def module(self, name: str) -> str:
-        """Name of the module that implements ``name``; ConfigurationError for an unknown name."""
-        return self[name].partition(":")[0]
-
     def load(self, name: str) -> Any:
         """Import the module of ``name`` and return the attribute that the entry names."""
         module, _, attribute = self[name].partition(":")

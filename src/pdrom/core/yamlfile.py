@@ -31,9 +31,8 @@ class ConfigModel(BaseModel):
             kind = bool if field is None else field.annotation
             for entry in value if isinstance(value, (list, tuple)) else [value]:
                 if isinstance(entry, bool) and kind is not bool:
-                    raise ValueError(
-                        f"{key} = {shown(value, 60)}: a truth value (yes, on, true ...)"
-                    )
+                    fault = "a truth value (yes, on, true ...)"
+                    raise ValueError(f"{key} = {shown(value, 60)}: {fault}")
                 if isinstance(entry, str) and _misread(entry) and "str" not in str(kind):
                     raise ValueError(f"{key} = {shown(value, 60)}: write {PLAIN}")
         return data
@@ -66,9 +65,8 @@ class _PlainLoader(yaml.CSafeLoader):
             if isinstance(key, (dict, list, set)):
                 raise yaml.constructor.ConstructorError(None, None, "a key must be a plain value")
             if key in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"key '{key}' is given twice", key_node.start_mark
-                )
+                fault = f"key '{key}' is given twice"
+                raise yaml.constructor.ConstructorError(None, None, fault, key_node.start_mark)
             seen.add(key)
         return super().construct_mapping(node, deep)
 

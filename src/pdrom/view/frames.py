@@ -56,10 +56,9 @@ def _draw(scene: ViewedScene) -> Figure:
     windows = [
         shared_window(CAMERA, q, [panels[i] for panels in every]) for i, q in enumerate(full)
     ]
-    with_bodies = [[replace(p, obstacles=bodies) for p in panels] for panels in every]
     rows = [
-        Row(label, scene.mesh, row, windows, full, CAMERA)
-        for label, row in zip(labels, with_bodies, strict=True)
+        Row(label, scene.mesh, [replace(p, obstacles=bodies) for p in row], windows, full, CAMERA)
+        for label, row in zip(labels, every, strict=True)
     ]
     return draw_rows(rows, height_limit=np.inf)
 

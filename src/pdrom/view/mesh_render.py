@@ -80,13 +80,9 @@ def draw_surface(
     edges = (1.0 - wire) * faces + wire * 0.08
     order = np.argsort(camera.depth(points)[triangles].mean(axis=1), kind="stable")
     collection = PolyCollection(
-        camera.project(points)[triangles[order]],
-        facecolors=faces[order],
-        edgecolors=edges[order],
-        linewidths=0.2,
-        joinstyle="round",
-        rasterized=len(triangles) > RASTER_ABOVE,
-    )
+        camera.project(points)[triangles[order]], facecolors=faces[order], linewidths=0.2,
+        edgecolors=edges[order], joinstyle="round", rasterized=len(triangles) > RASTER_ABOVE,
+    )  # fmt: skip
     ax.add_collection(collection)
     return collection
 

@@ -109,34 +109,21 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
     low, high = shown_region(full, scene.effects)
     bodies = [body for effect in scene.effects if (body := effect.body(low, high))]
     return {
-        "name": scene.name,
-        "title": scene.title,
-        "method": scene.method,
+        "name": scene.name, "title": scene.title, "method": scene.method,
         "triangles": pack_text(triangles.reshape(-1, 3).astype("<u4")),
-        "timeStep": scene.time_step,
-        "stride": stride,
-        "full": pack_positions(full),
-        "view": view_of(scene.effects),
-        "ranges": np.stack([low, high], axis=1).tolist(),
+        "timeStep": scene.time_step, "stride": stride, "full": pack_positions(full),
+        "view": view_of(scene.effects), "ranges": np.stack([low, high], axis=1).tolist(),
         "bodies": [
-            {
-                "points": [_numbers(axis) for axis in body.points.T],
-                "triangles": pack_text(body.triangles.astype("<u4")),
-            }
+            {"points": [_numbers(axis) for axis in body.points.T],
+             "triangles": pack_text(body.triangles.astype("<u4"))}
             for body in bodies
         ],
-        "ms": scene.ms,
-        "runs": [
-            {
-                "title": run.title,
-                "positions": pack_positions(run.positions[::stride, used]),
-                "error": _numbers(run.error),
-                "blowup": run.blowup_frame,
-                "ms": run.ms,
-            }
+        "ms": scene.ms, "runs": [
+            {"title": run.title, "positions": pack_positions(run.positions[::stride, used]),
+             "error": _numbers(run.error), "blowup": run.blowup_frame, "ms": run.ms}
             for run in scene.runs
         ],
-    }
+    }  # fmt: skip
 
 
 def view_of(effects: Sequence[EffectConfig]) -> dict[str, list[float]]:

@@ -17,15 +17,10 @@ RESULTS = "results"
 
 # Name of a wildcard in the paths of results -> regular expression for its values.
 LABELS = {
-    "mesh": r"[A-Za-z0-9_.-]+",
-    "scene": r"[a-z][a-z0-9_]*",
-    "run": r"train|heldout|kick|stiffness",
-    "group": r"[a-z_]+",
-    "basis": r"[a-z0-9-]+",
-    "method": r"[a-z0-9-]+",
-    "factor": r"[0-9.]+",
+    "mesh": r"[A-Za-z0-9_.-]+", "scene": r"[a-z][a-z0-9_]*", "run": r"train|heldout|kick|stiffness",
+    "group": r"[a-z_]+", "basis": r"[a-z0-9-]+", "method": r"[a-z0-9-]+", "factor": r"[0-9.]+",
     "name": r"[A-Za-z0-9_.]+",
-}
+}  # fmt: skip
 _LABEL = re.compile(r"\{(\w+)\}")
 
 

@@ -40,8 +40,8 @@ def escape(text: str) -> str:
         piece = _typeset(character)
         if piece is None:
             name = unicodedata.name(character, "a control character")
-            named = f"'{_shown(character)}' (U+{ord(character):04X}, {name})"
-            raise PaperError(f"'{_shown(text)}': {named} cannot be typeset")
+            named = f"'{character}' (U+{ord(character):04X}, {name})"
+            raise PaperError(f"'{text}': {named} cannot be typeset")
         pieces.append(piece)
     return "".join(pieces)
 
@@ -89,7 +89,3 @@ def _greek(character: str) -> str | None:
     if len(words) != 4 or words[::2] != ["greek", "letter"] or words[3] not in _GREEK.split():
         return None
     return "\\" + (words[3].capitalize() if words[1] == "capital" else words[3])
-
-
-def _shown(text: str) -> str:
-    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)

@@ -1,10 +1,8 @@
 """Reading and writing results: atomic, deterministic, with checksums and clear errors.
 
 A result is written to a temporary file beside its target and renamed when complete, so that an
-interrupted job never leaves a half-written file and never damages an older one. An HDF5 file has
-its checksum inside, every other result in a hidden file next to it; every reader checks it. A
-job of the workflow renames a damaged file, so that the next run finds it missing and makes it
-again. Other readers never rename a file.
+interrupted job never leaves a half-written file and never damages an older one. Every reader checks
+the result's checksum (`pdrom.core.store.checksum`).
 """
 
 import hashlib
@@ -291,16 +289,11 @@ def require_self_contained(file: h5py.File, path: str | os.PathLike[str]) -> Non
 
     Raises StorageError for a soft or an external link, external storage or a virtual dataset.
     """
-    groups: list[h5py.Group] = [file]
-    seen: set[int] = set()
-    while groups:
-        group = groups.pop()
-        place = h5py.h5o.get_info(group.id).addr
-        for name in group if place not in seen else ():
-            link = group.get(name, getlink=True)
-            item = group[name] if isinstance(link, h5py.HardLink) else None
-            if isinstance(item, h5py.Group):
-                groups.append(item)
-            elif not isinstance(item, h5py.Dataset) or item.is_virtual or item.external:
-                raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")
-        seen.add(place)
+
+    def check(name: str, link: object) -> None:
+        item = file[name] if isinstance(link, h5py.HardLink) else None
+        own = isinstance(item, h5py.Dataset) and not (item.is_virtual or item.external)
+        if not own and not isinstance(item, h5py.Group):
+            raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")
+
+    file.visititems_links(check)

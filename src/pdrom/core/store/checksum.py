@@ -9,8 +9,7 @@ Its last line has the format of the program ``b2sum``: the BLAKE2b digest of the
 the result's name. The line above is a comment to that program; it contains the provenance
 (`pdrom.core.provenance`) and a digest of the provenance.
 
-The stored checksum is compared with that of the file's bytes. Any difference, in the file or in its
-checksum, counts as damage. If both change, they match only if two 512-bit digests agree by chance.
+Any difference, in the file or in its checksum, counts as damage.
 """
 
 import errno
@@ -29,6 +28,7 @@ from pdrom.core.provenance import provenance
 
 # Whether a damaged result is renamed when read: inside the context `damaged_set_aside`.
 _ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=False)
+sets_aside = _ASIDE.get
 
 
 @contextmanager
@@ -171,18 +171,17 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
     """Refuse a result ``path`` that does not match its checksum; every reader calls this first.
 
     Raises StorageError if the file is missing, cannot be read, is damaged or (if not ``unchecked``)
-    has no checksum, or a job of the workflow reads the file of another result. Except if the file
-    is missing, a job renames it to ``*.damaged``, so that the next run makes it again.
+    has no checksum, or a job of the workflow (`damaged_set_aside`) reads another file than its own.
     """
     path = Path(path)
     try:
         condition = check_file(path)
     except StorageError as error:
         unusable = not path.is_file() or not os.access(path, os.R_OK)
-        if _ASIDE.get() and unusable and os.path.lexists(path):
+        if sets_aside() and unusable and os.path.lexists(path):
             raise _set_aside(path, "damaged, no file that can be read") from error
         raise
-    if condition is Condition.INTACT and _ASIDE.get():
+    if condition is Condition.INTACT and sets_aside():
         told = read_checksum(path)
         if told and told.file != os.path.normpath(path):
             other = told.file or "its checksum names none"
@@ -195,7 +194,7 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
         fault = "no checksum inside (written by an older pdrom, or by another program?)"
     else:
         fault = f"its checksum {checksum_path(path).name} is missing (copied without it?)"
-    if _ASIDE.get():
+    if sets_aside():
         raise _set_aside(path, fault if fault.startswith("damaged") else f"damaged, {fault}")
     way = f"; {UNCHECKED}" if condition is Condition.NO_CHECKSUM and is_hdf5(path) else ""
     raise StorageError(f"{path}: {fault}{way}")
@@ -219,7 +218,7 @@ def digest_told(path: str | os.PathLike[str]) -> str:
     A job of the workflow refuses another result, as `require_intact` does.
     """
     told = read_checksum(path)
-    if _ASIDE.get() and (told is None or told.file != os.path.normpath(path)):
+    if sets_aside() and (told is None or told.file != os.path.normpath(path)):
         require_intact(path)
     return told.digest if told else ""
 

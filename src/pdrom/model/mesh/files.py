@@ -81,12 +81,8 @@ def read_mesh_file(path: Path) -> Mesh:
     """Return the mesh of triangles or tetrahedra in the file ``path``, in a format of `READERS`.
 
     Log a warning with the number of polygons if the file has some, which are split into triangles.
-
-    Raises
-    ------
-    MeshError
-        The file is missing, unreadable, of another format, or exceeds a limit of `mesh_limits`; it
-        has other cells, or both triangles and tetrahedra.
+    MeshError if the file is missing, unreadable, of another format, exceeds a limit of
+    `mesh_limits`, or has other cells, or both triangles and tetrahedra.
     """
     try:
         if not path.is_file():

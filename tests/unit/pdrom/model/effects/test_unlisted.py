@@ -63,8 +63,8 @@ def test_a_scene_without_it_neither_imports_it_nor_holds_more_once_it_is_loaded(
     """The same compiled functions of its own, arrays and bytes, and the same bits of its run."""
     group = other_group(effect)
     found = report(group)
-    assert EFFECTS.module(group) in found["modules"]
-    assert EFFECTS.module(effect) not in found["modules"]
+    assert EFFECTS[group].partition(":")[0] in found["modules"]
+    assert EFFECTS[effect].partition(":")[0] not in found["modules"]
     alone, beside = found["alone"], found[effect]
     assert alone["arrays"] > 5
     for what in ("arrays", "bytes", "run"):
@@ -118,9 +118,9 @@ def test_a_scene_depends_on_the_code_of_its_own_effects_only(scene):
     """Fingerprints of its jobs cover these modules; an edit of another effect reruns nothing."""
     config = read_scene(ROOT, scene)
     covered = set(closure("study.experiments.fom", *config.modules))
-    listed = {EFFECTS.module(effect.effect) for effect in config.effects}
+    listed = {EFFECTS[effect.effect].partition(":")[0] for effect in config.effects}
     needed = set(closure(*listed))
-    every = {EFFECTS.module(effect) for effect in EFFECTS}
+    every = {EFFECTS[effect].partition(":")[0] for effect in EFFECTS}
     assert listed <= covered
     assert covered & every <= needed
 
