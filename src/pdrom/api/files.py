@@ -66,11 +66,11 @@ def file_path(path: Any) -> Path:
 
 def require_no_mesh(path: Path) -> None:
     """Raise ConfigurationError if the file ``path`` is a result or a mesh, not a scene."""
-    if path.suffix.lower() in (".h5", ".hdf5") and path.is_file():
-        name = quote(str(path))
+    kind, name = path.suffix.lower() * path.is_file(), quote(str(path))
+    if kind in (".h5", ".hdf5"):
         raise ConfigurationError(f"{path}: this is a result: `pdrom show {name}` says which")
-    if path.suffix.lower() in READERS and path.is_file():
-        made = f"`pdrom new --mesh {quote(str(path))}` makes a scene of it"
+    if kind in READERS:
+        made = f"`pdrom new --mesh {name}` makes a scene of it"
         raise ConfigurationError(f"{path}: this is a mesh: {made}")
 
 

@@ -187,13 +187,10 @@ def stored_run(scene: Scene, file: h5py.File) -> Run:
     """Run of ``scene`` from the open HDF5 ``file``."""
     stored, ended = file.get("snapshots", {}), int(file.attrs.get("blowup_frame", -1))
     return Run(
-        scene,
-        file["positions"][...],
-        file["timings"][...].sum(axis=1),
+        scene, file["positions"][...], file["timings"][...].sum(axis=1),
         {name: Snapshots(*(s[key][...] for key in _SNAPSHOTS)) for name, s in stored.items()},
-        str(file.attrs.get("method", FULL)),
-        None if ended < 0 else ended,
-    )
+        str(file.attrs.get("method", FULL)), None if ended < 0 else ended,
+    )  # fmt: skip
 
 
 def store_run(run: Run, file: h5py.File) -> None:

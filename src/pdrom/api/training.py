@@ -38,7 +38,6 @@ VALIDATION = 1_000_000  # first seed of the validation trajectories
 Progress = Callable[[str, int], OnFrame]
 """Function of the name of a step and its number of frames that returns what each frame calls."""
 
-
 Count = Annotated[int, Field(ge=0, le=10_000)]
 Bound = Annotated[float, Field(gt=0.0, lt=1.0)]
 

@@ -38,12 +38,9 @@ def parser() -> argparse.ArgumentParser:
     for name in COMMANDS:
         command: Command = import_module(f"pdrom.command.{name}").COMMAND
         own = below.add_parser(
-            name,
-            help=command.title,
-            description=command.title,
+            name, help=command.title, description=command.title, formatter_class=plain,
             epilog=f"example: {command.example}",
-            formatter_class=plain,
-        )
+        )  # fmt: skip
         for argument, keywords in command.arguments.items():
             own.add_argument(argument, **keywords)
         own.set_defaults(perform=command.perform, parser=own)

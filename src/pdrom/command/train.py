@@ -22,9 +22,8 @@ def perform(arguments: argparse.Namespace) -> Status:
     given |= {"converged": not arguments.unconverged, "progress": Progress}
     check(scene, given | {"others": arguments.runs[1:]})
     runs = [load(path, arguments.unchecked) for path in arguments.runs]
-    for path, one in zip(arguments.runs[:1], runs, strict=False):
-        if one.scene.config != scene.config:
-            raise StorageError(f"{path}: a run of another scene than {arguments.scene}")
+    if runs and runs[0].scene.config != scene.config:
+        raise StorageError(f"{arguments.runs[0]}: a run of another scene than {arguments.scene}")
     before = 0.0
     if not runs:
         runs = [run(scene, on_frame=Progress(scene.config.name, scene.config.frames))]

@@ -11,7 +11,7 @@ import json
 import os
 import platform
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -58,12 +58,10 @@ def made_by(name: str, configuration: Any, code: str = "", inputs: str = "") -> 
 @cache
 def library_versions() -> dict[str, str]:
     """Versions of the packages in `LIBRARIES`; "absent" for one that is not installed."""
-    found = {}
+    found = dict.fromkeys(LIBRARIES, "absent")
     for name in LIBRARIES:
-        try:
+        with suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "absent"
     return found
 
 

@@ -285,15 +285,17 @@ def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator
 
 
 def require_self_contained(file: h5py.File, path: str | os.PathLike[str]) -> None:
-    """Refuse an HDF5 ``file``, at ``path``, that refers to data in other files.
-
-    Raises StorageError for a soft or an external link, external storage or a virtual dataset.
-    """
-
-    def check(name: str, link: object) -> None:
-        item = file[name] if isinstance(link, h5py.HardLink) else None
-        own = isinstance(item, h5py.Dataset) and not (item.is_virtual or item.external)
-        if not own and not isinstance(item, h5py.Group):
-            raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")
-
-    file.visititems_links(check)
+    """Raise StorageError if an HDF5 ``file`` at ``path`` has links or data outside of it."""
+    groups: list[h5py.Group] = [file]
+    seen: set[int] = set()
+    while groups:
+        group = groups.pop()
+        place = h5py.h5o.get_info(group.id).addr
+        for name in group if place not in seen else ():
+            link = group.get(name, getlink=True)
+            item = group[name] if isinstance(link, h5py.HardLink) else None
+            if isinstance(item, h5py.Group):
+                groups.append(item)
+            elif not isinstance(item, h5py.Dataset) or item.is_virtual or item.external:
+                raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")
+        seen.add(place)

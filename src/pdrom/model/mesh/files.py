@@ -117,12 +117,9 @@ def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
         ended = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=limits.deadline,
+            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=limits.deadline,
             env=os.environ | single,
-        )
+        )  # fmt: skip
     except subprocess.TimeoutExpired as error:
         raise MeshError(f"{path}: not read after {limits.deadline:g} s; {ADVICE}") from error
     except OSError as error:

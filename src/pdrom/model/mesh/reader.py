@@ -81,9 +81,8 @@ def read(path: str, max_vertices: int, max_cells: int) -> tuple[np.ndarray, np.n
     except (MemoryError, raw.RefusedError):
         raise
     except Exception as error:
-        raise raw.UnreadableError(
-            f"cut off, or not a valid {suffix} file; `meshio convert` may read it"
-        ) from error
+        fault = f"cut off, or not a valid {suffix} file; `meshio convert` may read it"
+        raise raw.UnreadableError(fault) from error
 
 
 def cells_of(found: raw.Found) -> tuple[np.ndarray, str]:
@@ -168,6 +167,5 @@ def _check_faces(triangles: np.ndarray, tetrahedra: np.ndarray) -> None:
     # an integer per face; 64 bits suffice for 10^6 vertices
     weights = np.array([size**2, size, 1])
     if not np.isin(*(np.sort(corners, axis=1) @ weights for corners in (triangles, faces))).all():
-        raise raw.RefusedError(
-            "holds tetrahedra and triangles that are not their faces, allowed: only one of both"
-        )
+        fault = "holds tetrahedra and triangles that are not their faces"
+        raise raw.RefusedError(f"{fault}, allowed: only one of both")
