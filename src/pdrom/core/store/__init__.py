@@ -285,7 +285,7 @@ def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator
 
 
 def require_self_contained(file: h5py.File, path: str | os.PathLike[str]) -> None:
-    """Raise StorageError if an HDF5 ``file`` at ``path`` has links or data outside of it."""
+    """Raise StorageError if ``file`` (at ``path``) has links, external storage or virtual data."""
     groups: list[h5py.Group] = [file]
     seen: set[int] = set()
     while groups:
