@@ -295,15 +295,11 @@ def scenes(
 ) -> Rows:
     """Scenes: groups, mesh size, frames, first frame in which runs are not compared, and errors.
 
-    These are the position and deformation errors of the full-order runs of the test trajectories.
+    These are the deformation errors of the full-order runs of the test trajectories.
     """
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
     header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon", *MOTIONS]
-    yield rf"l{LEFT}p{{3.2cm}}rrrrrrr", header
-
-    def off(run: pd.Series) -> str:
-        error, shape = run.full_order_error, run.full_order_deformation_error
-        return f"{_known(error)}, {_known(shape)}"
+    yield rf"l{LEFT}p{{3cm}}rrrrrrr", header
 
     for row in scenes.itertuples():
         end = horizon.get(row.scene)
@@ -312,16 +308,17 @@ def scenes(
         powers = re.sub(r"([\d.]+)e\+?(-?)0*(\d+)", r"$\1\\cdot 10^{\2\3}$", _group(row.groups))
         sizes = map(str, (row.vertices, row.elements, row.frames))
         runs = [_rows(test_trajectories, scene=row.scene, motion=motion) for motion in MOTIONS]
-        errors = [_cell(run, off) for run in runs]
+        errors = [_cell(run, lambda own: _known(own.full_order_deformation_error)) for run in runs]
         yield [_name(row.scene), powers.replace(r"$1\cdot 10", "$10"), *sizes, shown, *errors]
 
 
 def trajectories(test_trajectories: pd.DataFrame) -> Rows:
-    """Test trajectories: how far from rigid and affine, errors of replay, errors of references."""
+    """Test trajectories: how far from rigid and affine, errors of replay, full order, reference."""
     columns = {
         "rigid": "deformation", "affine": "affine", "replay": "replay_error",
-        "shape": "replay_deformation_error", "reference": "reference_error",
-        "its shape": "reference_deformation_error",
+        "shape": "replay_deformation_error", "full order": "full_order_error",
+        "its shape": "full_order_deformation_error", "reference": "reference_error",
+        "its own": "reference_deformation_error",
     }  # fmt: skip
     yield "ll" + "r" * len(columns), ["scene", "trajectory", *columns]
     for _, row in test_trajectories.iterrows():
