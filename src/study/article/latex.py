@@ -34,7 +34,7 @@ _FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end
 # Finds one-line definitions of TeX commands and theorems in the preamble; pandoc can read these.
 # Definitions of layout commands are left out: `REPLACED` has simple ones of the same commands.
 _SHORT = re.compile(
-    r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile|pictureof)\w+\}.*\}|newtheorem.*)$"
+    r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile|pictureof|val|known|row)\w+\}.*\}|newtheorem.*)$"
 )
 REPLACED = r"""
 \newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}

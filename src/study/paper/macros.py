@@ -48,18 +48,12 @@ def keys_of(source: str) -> list[str]:
 
 def macros(source: str, tables: Mapping[str, pd.DataFrame]) -> str:
     r"""Return TeX macros for every ``\val`` key of ``source``, see `number_of`."""
-    lines = [
-        "% generated from results/tables",
-        r"\makeatletter",
-        r"\newcommand{\val}[1]{\@ifundefined{val@#1}{\errmessage{no value for #1}}"
-        r"{\csname val@#1\endcsname}}",
-    ]
-    return _defined(lines, "val", {key: number_of(key, tables).text for key in keys_of(source)})
+    return _defined("val", {key: number_of(key, tables).text for key in keys_of(source)})
 
 
-def _defined(lines: Sequence[str], kind: str, texts: Mapping[str, str]) -> str:
+def _defined(kind: str, texts: Mapping[str, str]) -> str:
     made = [rf"\expandafter\def\csname {kind}@{k}\endcsname{{{text}}}" for k, text in texts.items()]
-    return "\n".join([*lines, *made, r"\makeatother"]) + "\n"
+    return "\n".join(["% generated", r"\makeatletter", *made, r"\makeatother"]) + "\n"
 
 
 class Number(NamedTuple):
@@ -222,7 +216,7 @@ def decisions(
 def provenance(
     decided: Mapping[str, Sequence[str]], part: str | None, full_study: str, times: str = ""
 ) -> str:
-    r"""TeX definitions of ``\known``, ``\row``, ``\ifpart``, ``\timesnote``, configurations' names.
+    r"""TeX definitions of ``\ifpart``, ``\timesnote``, names of configurations; shown blocks.
 
     decided : name of a document (``\jobname`` in TeX) -> result of `decisions` for its source
     part, full_study : as in class `Facts`; ``\ifpart`` is false if ``part`` is None
@@ -235,13 +229,6 @@ def provenance(
         rf"\newcommand{{\fullstudy}}{{\texttt{{{escape(full_study)}}}}}",
         rf"\newcommand{{\timesnote}}{{{times}}}",
         r"\makeatletter",
-        r"\newcounter{known}",
-        r"\let\known@shown\@firstofone",
-        r"\let\known@dropped\@gobble",
-        r"\newcommand{\known@next}{\csname known@\jobname @\arabic{known}\endcsname}",
-        r"\newcommand{\known}[1]{\stepcounter{known}\known@next{#1}}",
-        # \noalign because a row that is left out must not start a table cell
-        r"\newcommand{\row}[1]{\noalign{\stepcounter{known}}\known@next{#1}}",
     ]
     for document, made in decided.items():
         for number, decision in enumerate(made, start=1):
@@ -262,5 +249,4 @@ def closing(source: str, start: int) -> int:
 
 def captions(texts: Mapping[str, str]) -> str:
     r"""Return TeX macros ``caption@NAME`` with the captions of all figures, given as TeX."""
-    first = ["% generated from the declarations of the figures", r"\makeatletter"]
-    return _defined(first, "caption", texts)
+    return _defined("caption", texts)
