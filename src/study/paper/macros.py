@@ -124,10 +124,9 @@ def _parse(
     for entry in entries:
         parsed = _FILTER.fullmatch(entry)
         filters.append((parsed[1], parsed[2], parsed[3]) if parsed else (entry, "=", ""))
-    known = tables[name].columns
     for field in (*(field for field, _, _ in filters), column):
-        if field not in known:
-            allowed = ", ".join(known)
+        if field not in tables[name]:
+            allowed = ", ".join(tables[name].columns)
             raise PaperError(f"\\val{{{key}}}: no column '{field}' (allowed: {allowed})")
     return name, filters, column, aggregate
 
@@ -165,8 +164,7 @@ def format_number(value: Any) -> str:
     mantissa, exponent = f"{number:.1e}".split("e")
     power = int(exponent)
     if -3 < power < 4:
-        digits = max(0, 1 - power)
-        return f"{number:.{digits}f}"
+        return f"{number:.{max(0, 1 - power)}f}"
     return rf"\ensuremath{{{mantissa}\cdot 10^{{{power}}}}}"
 
 
@@ -189,14 +187,11 @@ def sentences(source: str) -> list[Sentence]:
     Raises PaperError if a block is not closed or contains another block.
     """
     found: list[Sentence] = []
-    opening = _OPENING.search(source)
-    while opening:
+    for opening in _OPENING.finditer(source):
+        if found and opening.start() < found[-1].end:
+            raise PaperError(f"{source[found[-1].start :][:40]} ...: holds another one")
         end = closing(source, opening.end())
-        text = source[opening.end() : end]
-        if _OPENING.search(text):
-            raise PaperError(f"{opening[0]}{text[:40]} ...: holds another one")
-        found.append(Sentence(text, opening.start(), end + 1))
-        opening = _OPENING.search(source, end)
+        found.append(Sentence(source[opening.end() : end], opening.start(), end + 1))
     return found
 
 

@@ -2,7 +2,9 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from inspect import signature
+from operator import itemgetter
 from typing import Any
 
 import pandas as pd
@@ -67,9 +69,10 @@ def _rows(table: pd.DataFrame, **wanted: object) -> pd.DataFrame:
     return table
 
 
-def _cell(rows: pd.DataFrame, text: Callable[[pd.Series], str]) -> str:
-    """Return what the function ``text`` makes of the first row; a dash if ``rows`` is empty."""
-    return text(rows.iloc[0]) if len(rows) else NONE
+def _cell(rows: pd.DataFrame, shown: Callable[[pd.Series], Any]) -> str:
+    """Text or number that ``shown`` takes from the first row; a dash if ``rows`` is empty."""
+    found = shown(rows.iloc[0]) if len(rows) else NONE
+    return found if isinstance(found, str) else format_number(found)
 
 
 _VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
@@ -142,22 +145,20 @@ _TOLERANCE = "ecsw-1e-02"
 def positions(reduced_reruns: pd.DataFrame) -> Rows:
     """Errors and speed-ups of runs in position subspaces, for the largest dimension k per scene."""
 
-    def error(run: pd.Series) -> str:
-        return format_number(run.relative_error_within_horizon)
-
     def unseen(run: pd.Series, column: str = MEDIAN) -> str:
         same = {column: run[column] for column in ("scene", "method", "k", "position_basis")}
         motions = over_motions(_rows(reduced_reruns, group="all", **same))
-        return _cell(motions, lambda found: format_number(found[column]))
+        return _cell(motions, itemgetter(column))
 
-    columns = {
+    error = itemgetter("relative_error_within_horizon")
+    columns: dict[str, tuple[str, str, Callable[[pd.Series], Any]]] = {
         "all": ("pod", "full", error),
         "playback, held out": ("pod", "full", lambda run: unseen(run, "playback_error")),
         "all, held out": ("pod", "full", unseen),
         "sampled": ("pod", _TOLERANCE, error),
         "sampled, held out": ("pod", _TOLERANCE, unseen),
         "elements": ("pod", _TOLERANCE, lambda run: _whole(run.r)),
-        "speed-up": ("pod", _TOLERANCE, lambda run: format_number(run.speedup)),
+        "speed-up": ("pod", _TOLERANCE, itemgetter("speedup")),
         "hrpd": ("pod", "hrpd", error),
         "skinning, all": ("skinning", "full", error),
     }
@@ -202,14 +203,12 @@ def speedups(speedups: pd.DataFrame) -> Rows:
         size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
         frames = row.frames_to_break_even  # frames until time saved repays training; 2 digits shown
         yield [
-            _name(row.scene),
-            _name(f"{row.method}, {size}"),
+            *map(_name, (row.scene, f"{row.method}, {size}")),
             _known(row.full_ms),
             _known(row.shown, escape) + (" (loses)" if row.loses == 1 else ""),
             f"{_known(row.error_train)} ({_known(row.deformation_train)})",
             f"{_known(row.error_heldout)} ({_known(row.deformation_heldout)})",
-            _known(row.playback_error),
-            *map(_known, (row.training_s, row.reduction_s)),
+            *map(_known, (row.playback_error, row.training_s, row.reduction_s)),
             "never" if pd.isna(frames) else _whole(float(f"{frames:.1e}")),
         ]
 
@@ -257,9 +256,7 @@ def pays(winners: pd.DataFrame) -> Rows:
             str(smallest) if smallest == largest else f"{smallest} to {largest}",
             _known(row.from_plain, _whole),
             _known(row.from_best, _whole),
-            NONE
-            if pd.isna(row.speedup)
-            else in_words(row.speedup, row.speedup_low, row.speedup_high),
+            _known(row.speedup, partial(in_words, low=row.speedup_low, high=row.speedup_high)),
             f"{_known(row.reached, _whole)} of {row.motions}",
         ]
         if cells not in before:
@@ -357,7 +354,7 @@ def ranks(singular_values: pd.DataFrame) -> Rows:
     for (scene, group), part in singular_values.groupby(["scene", "group"], sort=False):
         real = part[part.above_roundoff]
         cells = [_rows(real, component=component) for component in (6, 10, 20)]
-        decay = [_cell(cell, lambda row: format_number(row.relative)) for cell in cells]
+        decay = [_cell(cell, itemgetter("relative")) for cell in cells]
         yield [_name(scene), _group(group), str(len(real)), *decay]
 
 
