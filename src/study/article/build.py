@@ -306,8 +306,8 @@ def _write_figures(
 
 WRITES = {
     **PAGES, "tables": "tables.html", "claims": "claims.html", "style": "article.css",
-    "script": "article.js", **{f"table_{name}": f"tables/{name}.html" for name in declared()},
-    **{f"table_{name}": f"tables/{name}.html" for name in FACTS},
+    "script": "article.js",
+    **{f"table_{name}": f"tables/{name}.html" for name in (*declared(), *FACTS)},
     **{f"picture_{name}": f"figures/{name}.webp" for name in declarations()},
 }  # fmt: skip
 LIMIT = 300.0  # time limit of pandoc, s; a TeX definition that expands to itself never ends
