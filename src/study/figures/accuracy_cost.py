@@ -133,11 +133,9 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
         heights = np.clip(front[ERROR].to_numpy(float), LOW, HIGH)
         steps = {"linewidth": 1.3, "drawstyle": "steps-post", "zorder": 1.5}
         ax.plot(front[TIME], heights, color=colour, **steps)
-        ended = lost[lost.family == family]
-        ax.plot(
-            ended[TIME], np.full(len(ended), 0.6 * HIGH), BLOWN_UP, color=colour,
-            markersize=6.0, markeredgewidth=1.8,
-        )  # fmt: skip
+        ended = lost[lost.family == family][TIME]
+        cross = {"markersize": 6.0, "markeredgewidth": 1.8}
+        ax.plot(ended, np.full(len(ended), 0.6 * HIGH), BLOWN_UP, color=colour, **cross)
     times = [*rows[TIME], *lost[TIME], found.own_ms.get(scene, np.nan)]
     time_axis(ax, np.asarray(times, dtype=float))
     if scene in found.own_ms:
@@ -150,9 +148,8 @@ def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any)
     common = {"linestyle": "none", "color": colour, "alpha": 0.75, "markeredgewidth": 0.9}
     ax.plot(time[inside], error[inside], markersize=size, **common, **look)
     for outside, rim, arrow in ((error < LOW, LOW, BELOW), (error > HIGH, HIGH, ABOVE)):
-        if outside.any():
-            at = np.full(outside.sum(), rim)
-            ax.plot(time[outside], at, marker=arrow, markersize=size + 2.5, **common)
+        at = np.full(outside.sum(), rim)
+        ax.plot(time[outside], at, marker=arrow, markersize=size + 2.5, **common)
 
 
 def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
@@ -175,12 +172,8 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
 def handles(found: TradeOffs) -> list[Block]:
     """Return blocks of the legend: full-order runs, then the models in ``found`` by `FAMILIES`."""
     common = {"linewidth": 1.0, "markersize": 4.0}
-    entries = [
-        ("full order", [
-            style.handle("K iterations", color=FAMILIES[ITERATIONS], marker="X", **common),
-            style.handle("time with the scene's K", **OWN),
-        ]),
-    ]  # fmt: skip
+    entries = [("full order", style.handles({"K iterations": (style.BLACK, "X")}, **common))]
+    entries[0][1].append(style.handle("time with the scene's K", **OWN))
     for family, colour in FAMILIES.items():
         looks = {name: (colour, marker) for name, marker in found.members(family).items()}
         if looks and family != ITERATIONS:
@@ -254,10 +247,8 @@ def _draw_rates(ax: Axes) -> None:
 
 
 def _label(ax: Axes, x: float, text: str) -> None:
-    ax.text(
-        x, 0.99, text, transform=ax.get_xaxis_transform(), fontsize=6.5, va="top", ha="right",
-        color="#6B675F",
-    )  # fmt: skip
+    look = {"fontsize": 6.5, "va": "top", "ha": "right", "color": "#6B675F"}
+    ax.text(x, 0.99, text, transform=ax.get_xaxis_transform(), **look)
 
 
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits

@@ -1,6 +1,5 @@
 """Figures of the cost of a run: by phase, effect and mesh size, and of reduced local steps."""
 
-from collections.abc import Sequence
 from itertools import cycle
 
 import numpy as np
@@ -13,7 +12,7 @@ from study.artifact.paths import CONTRIBUTIONS, File
 from study.artifact.reads import EachOf, TableOf
 from study.experiments.kit.base import GLOBAL, REST, RIGHT
 from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, figure, method_styles
-from study.figures.kit.multiples import label_outer, plain_ticks, small_multiples
+from study.figures.kit.multiples import label_outer, label_rows, plain_ticks, small_multiples
 from study.tables.effects_cost import NOTHING
 
 # Phases of a frame: (label, colour). The first two form the local step, whose share is printed.
@@ -73,7 +72,7 @@ def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
         rows = table[table.implementation == implementation].drop_duplicates("scene")
         _draw_bars(ax, rows.set_index("scene"), scenes)
         ax.set(title=TITLES[implementation], xlabel="share of a frame (%)")
-    _label_rows(axes[0], scenes)
+    label_rows(axes[0], scenes)
     handles: list[Artist] = [style.patch(label, color=c) for label, c in PHASES.values()]
     line = {"color": style.BLACK, "linestyle": "--"}
     handles.append(style.handle(f"{CLAIM:.0f} % (claim C1)", **line))
@@ -81,24 +80,14 @@ def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _label_rows(ax: Axes, names: Sequence[str]) -> None:
-    """Label the rows of ``ax`` at y = 0, 1, 2, ..., from the top."""
-    ax.set_yticks(range(len(names)), [style.words(name) for name in names])
-    ax.set_ylim(len(names) - 0.4, -0.6)
-    ax.tick_params(axis="y", length=0)
-
-
 def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
     for y, scene in enumerate(scenes):
         if scene not in rows.index:
             continue
         times = np.nan_to_num(rows.loc[scene, [*PHASES][:-1]].to_numpy(float))
-        total, start = float(rows.ms_per_frame[scene]), 0.0
-        parts = [*times, total - times.sum()]
-        for time, (_, colour) in zip(parts, PHASES.values(), strict=True):
-            share = 100.0 * time / total
-            ax.barh(y, share, left=start, color=colour, height=0.72)
-            start += share
+        total = float(rows.ms_per_frame[scene])
+        shares = 100.0 * np.array([*times, total - times.sum()]) / total
+        _draw_bar(ax, y, shares, [colour for _, colour in PHASES.values()])
         printed = f"{100.0 * rows.local_share[scene]:.0f} %"
         ax.text(2.0, y, printed, va="center", ha="left", fontsize=7.5, fontweight="bold")
         words = f"{total:.2g} ms" if total < 99.5 else f"{total:.0f} ms"
@@ -106,6 +95,11 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
     ax.axvline(CLAIM, color=style.BLACK, linewidth=1.0, linestyle="--")
     ax.set(xlim=(0, 100), xticks=[0, 25, 50, 75, 100])
     ax.tick_params(axis="y", length=0)
+
+
+def _draw_bar(ax: Axes, y: float, parts: np.ndarray, colours: list[str]) -> None:
+    ends = np.cumsum(parts)
+    ax.barh(np.full(len(parts), y), parts, left=ends - parts, color=colours, height=0.72)
 
 
 @figure(
@@ -256,7 +250,7 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
                 color=colour, markerfacecolor=colour if row.above_floor else "white",
                 clip_on=False,
             )  # fmt: skip
-    _label_rows(ax, scenes)
+    label_rows(ax, scenes)
     ax.set(xscale="log", xlim=(LOW, HIGH), xlabel="drift of the run without the effect")
     ax.grid(True)
 
@@ -276,11 +270,9 @@ def effects_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
     scenes = drawn.scenes_of(costs, "no timings of effects")
     several = [scene for scene in scenes if (removed.scene == scene).any()]
     rows = removed[removed.scene == several[0]] if several else removed[:0]
-    height = 0.27 * max(len(scenes), len(rows)) + 1.3
-    figure = style.new_figure(height)
+    figure = style.new_figure(0.27 * max(len(scenes), len(rows)) + 1.3)
     axes = figure.subplots(1, 2 if several else 1, squeeze=False)[0]
-    looks = drawn.looks
-    colours = {**{group: colour for group, (colour, _) in looks.items()}, **COLOURS}
+    colours = {group: colour for group, (colour, _) in drawn.looks.items()} | COLOURS
     parts = _draw_scenes(axes[0], costs, scenes, colours)
     handles: list = [style.patch(style.words(part), color=colours[part]) for part in parts]
     if several:
@@ -299,14 +291,11 @@ def _draw_scenes(
     parts = [part for part in colours if (costs.part == part).any()]
     for y, scene in enumerate(scenes):
         rows = costs[costs.scene == scene]
-        start = 0.0
-        for part, share in (100.0 * rows.groupby("part").share.sum()).reindex(parts).items():
-            if share > 0.0:
-                ax.barh(y, share, left=start, color=colours[str(part)], height=0.72)
-                start += share
+        shares = 100.0 * rows.groupby("part").share.sum().reindex(parts, fill_value=0.0)
+        _draw_bar(ax, y, shares.clip(lower=0.0).to_numpy(), [colours[part] for part in parts])
         total = rows.ms_per_frame.sum()
         ax.text(101.0, y, f"{total:.2g} ms", va="center", ha="left", fontsize=7)
-    _label_rows(ax, scenes)
+    label_rows(ax, scenes)
     ax.set(xlim=(0, 100), xlabel="share of a full-order frame (%)", ylabel="scene")
     return parts
 
@@ -321,6 +310,6 @@ def _draw_left_out(ax: Axes, rows: pd.DataFrame, scene: str) -> None:
                 [whole - row.ms_per_frame], [y], marker="|", color=style.BLACK, markersize=9,
                 markeredgewidth=1.4,
             )  # fmt: skip
-    _label_rows(ax, [f"without {e}" if e != NOTHING else "whole" for e in rows.effect])
+    label_rows(ax, [f"without {e}" if e != NOTHING else "whole" for e in rows.effect])
     ax.set(xlim=(0.0, 1.15 * float(rows.without_ms.max())), xlabel="time per frame (ms)")
     ax.set_title(style.words(scene))

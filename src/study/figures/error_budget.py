@@ -8,6 +8,7 @@ from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import Drawn, figure
+from study.figures.kit.multiples import label_rows
 
 LOW, HIGH = 1e-4, 10.0  # limits of the error axes; errors outside are drawn on the limits
 # Part -> (label, colour, marker).
@@ -43,9 +44,7 @@ def error_budget(drawn: Drawn, table: pd.DataFrame) -> Figure:
                 _draw(ax, rows.set_index("part")[column], y + APART * (i - 1))
         ax.axvline(0.1, color=style.GREY, linewidth=0.8, linestyle="--", zorder=0)
         ax.set(xlabel=label, xlim=(0.8 * LOW, 1.25 * HIGH))
-    axes[0].set_yticks(range(len(scenes)), [style.words(name) for name in scenes])
-    axes[0].set_ylim(len(scenes) - 0.4, -0.6)
-    axes[0].tick_params(axis="y", length=0)
+    label_rows(axes[0], scenes)
     looks = {name: (colour, marker) for name, colour, marker in PARTS.values()}
     style.legend(figure, style.handles(looks, linestyle="none"), 2)
     return figure

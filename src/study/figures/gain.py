@@ -75,7 +75,7 @@ def _draw_method(
     x, y = np.clip(x, *GAINS), np.clip(y, *ERRORS)
     look = {"linestyle": "none", "color": colour, "markeredgewidth": 0.0, "clip_on": False}
     for arrow, beyond in outside.items():  # by Matplotlib's numbers of arrow markers
-        if beyond.any():
+        if beyond.any():  # an artist without points and clipping would move the axes
             ax.plot(x[beyond], y[beyond], marker=arrow, markersize=5.0, alpha=0.8, **look)
     ax.plot(x, y, marker=marker, markersize=3.2, alpha=0.7, **look)
     gains = [np.clip(ranges[f"gain_{e}"].to_numpy(float), *GAINS) for e in ENDS]
@@ -167,9 +167,8 @@ def _draw_quantity(
         signs = table[(table.scene == scene) & (table.direction == "signs")][columns[0]]
         if len(signs):
             spread = np.clip(np.nan_to_num(signs.to_numpy(float), nan=np.inf), *limits)
-            ax.hlines(
-                heights[0], spread.min(), spread.max(), color=colour, linewidth=3.0, alpha=0.25
-            )
+            wide = {"color": colour, "linewidth": 3.0, "alpha": 0.25}
+            ax.hlines(heights[0], spread.min(), spread.max(), **wide)
     first_down = next((i for i, (d, _) in enumerate(rungs) if d == "down"), len(rungs))
     ax.axhline(first_down - 0.5, color="#333333", linewidth=0.8)
 
@@ -330,8 +329,7 @@ def _draw_errors(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
         )  # fmt: skip
         above = error > SHOWN[1]
         if train and above.any():
-            ax.plot(
-                line.r[above], np.full(above.sum(), SHOWN[1]), linestyle="none", marker=6,
-                markersize=5, color=colour, clip_on=False, zorder=5,
-            )  # fmt: skip
+            rim = np.full(above.sum(), SHOWN[1])
+            arrow = {"marker": 6, "markersize": 5, "clip_on": False, "zorder": 5}
+            ax.plot(line.r[above], rim, linestyle="none", color=colour, **arrow)
     return drawn

@@ -20,7 +20,7 @@ from study.experiments.kit.base import Horizon
 from study.figures.kit.declaration import Drawn, Experiment, NothingToDraw, camera_of, figure
 from study.figures.kit.elements import magnitudes
 from study.figures.kit.read import choose_ranks, positions_at, rerun_infos
-from study.figures.sensitivity_floor import FLOORS, Floors
+from study.figures.sensitivity_floor import FLOORS, floors_of
 from study.tables.errors import VOLUMES
 from study.tables.kit.results import trained
 
@@ -98,15 +98,15 @@ class Runs:
             raise NothingToDraw("no reduced run")
 
     @cached_property
-    def floors(self) -> Floors:
-        """Sensitivity floor and horizon of each scene."""
-        return Floors(self.sensitivity, self.horizon)
+    def ends(self) -> dict[str, int | None]:
+        """Horizon of each scene; None if it lies beyond the run."""
+        floors = floors_of(self.sensitivity, self.horizon)
+        return {scene: end for scene, (_, end) in floors.items()}
 
     def shown(self, experiment: Experiment) -> Shown:
         """Return the scene of ``experiment`` at the last of the instants."""
-        path, instant = experiment.path(self.full_order), self.frames[-1:]
-        (frame,), full = positions_at(path, instant)
-        end = self.floors.horizon(experiment.scene)
+        (frame,), full = positions_at(experiment.path(self.full_order), self.frames[-1:])
+        end = self.ends[experiment.scene]
         return Shown(
             experiment,
             load_mesh(experiment.path(self.meshes)),
@@ -258,8 +258,7 @@ def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     runs = Runs(drawn, horizon, (20, 10, "full"), (0.5, 0.75, 1.0), **files)
     one = drawn.experiments[0]
     mesh, camera = load_mesh(one.path(runs.meshes)), camera_of(one)
-    end = runs.floors.horizon(one.scene)
-    frames, full = positions_at(one.path(runs.full_order), runs.frames, end)
+    frames, full = positions_at(one.path(runs.full_order), runs.frames, runs.ends[one.scene])
     first = [
         RunPanel(f"frame {f}", style.FULL_ORDER, q, reference=True)
         for f, q in zip(frames, full, strict=True)

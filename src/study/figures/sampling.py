@@ -96,8 +96,7 @@ def deim_iterations(
         relative = step.magnitude / max(largest, np.finfo(float).tiny)
         elements.draw(ax, mesh.points, relative, camera, colours)
         centres = camera.project(elements.centres(mesh.points))
-        if len(step.earlier):
-            ax.plot(*centres[step.earlier].T, "o", zorder=5, **EARLIER)
+        ax.plot(*centres[step.earlier].T, "o", zorder=5, **EARLIER)
         ax.plot(*centres[step.newest], "o", zorder=6, **NEWEST)
         ax.set_title(f"k = {step.k}: element {step.newest}, {'xyz'[step.entry % 3]} entry")
         ax.set_xlabel(f"largest residual {largest:.2g}", fontsize=7.5)
@@ -143,19 +142,14 @@ def iterations(
 
 def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
     """Residual of mode k, fitted by earlier modes at ``entries`` with one set of coefficients."""
-    if k == 0:
-        return V[:, 0]
     coefficients = np.linalg.lstsq(V[entries, :k], V[entries, k], rcond=None)[0]
     return V[:, k] - V[:, :k] @ coefficients
 
 
 def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
     """Residual of mode k, fitted by earlier modes at sampled rows, separately for x, y and z."""
-    split = V.reshape(-1, 3, V.shape[1])
-    residual = np.empty(split.shape[:2])
-    for axis in range(3):
-        residual[:, axis] = _shared_residual(split[:, axis], entries // 3, k)
-    return residual.ravel()
+    axes = np.moveaxis(V.reshape(-1, 3, V.shape[1]), 1, 0)
+    return np.stack([_shared_residual(own, entries // 3, k) for own in axes], axis=1).ravel()
 
 
 @figure(
@@ -177,12 +171,12 @@ def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
     scalar = [m for m in methods if drawn.reductions[m].rows == "scalar"]
     if not scalar:
         raise NothingToDraw("no method that samples single entries (deim, qdeim)")
-    sampled = []
-    for each in drawn.experiments:
-        samplings = {m: read_samplings(each.path(files["samples"], method=m)) for m in methods}
-        if samplings[scalar[0]]:
-            sampled.append((each, samplings))
-    if not sampled:
+    samples = files["samples"]
+    read = [
+        (each, {m: read_samplings(each.path(samples, method=m)) for m in methods})
+        for each in drawn.experiments
+    ]
+    if not (sampled := [(each, found) for each, found in read if found[scalar[0]]]):
         raise NothingToDraw("no samples")
     figure = style.new_figure(ROW_HEIGHT * len(sampled) + 0.55)
     axes = figure.subplots(len(sampled), 3, squeeze=False, width_ratios=[1.25, 1.0, 1.1])
@@ -221,9 +215,8 @@ def _draw_hits(
     draw_surface(ax, points, elements.mesh, camera=camera, colour=shapes.NEUTRAL, wire=0.18)
     centres = camera.project(elements.centres(points))
     for axis, colour in AXES.items():
-        where = centres[[e for e, a in hit.items() if a == axis]]
-        if len(where):
-            ax.scatter(*where.T, s=15, color=colour, edgecolors="white", linewidths=0.4, zorder=5)
+        where = centres[np.array([e for e, a in hit.items() if a == axis], int)]
+        ax.scatter(*where.T, s=15, color=colour, edgecolors="white", linewidths=0.4, zorder=5)
     set_window(ax, window_of(camera, [points], 0.04))
 
 

@@ -1,7 +1,5 @@
 """Figure of how far full-order runs from slightly different starts drift apart, by frame."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from pdrom.core.store import read_table
@@ -10,12 +8,13 @@ from pdrom.view import style
 from pdrom.view.artists import Figure
 from study.artifact.paths import SENSITIVITY, File
 from study.artifact.reads import EachOf, Read, Setting
-from study.experiments.kit.base import Horizon, floor_of, horizon
+from study.experiments.kit.base import Horizon, floor_of
+from study.experiments.kit.base import horizon as horizon_of
 from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, figure
 from study.figures.kit.multiples import label_outer, small_multiples
 from study.tables.kit.results import TWIN
 
-# Inputs from which figures make `Floors`: the sensitivity floor and horizon of each scene.
+# Inputs of `floors_of`.
 FLOORS: dict[str, Read] = {
     "sensitivity": EachOf(SENSITIVITY, "experiments"),
     "horizon": Setting("horizon"),
@@ -23,24 +22,22 @@ FLOORS: dict[str, Read] = {
 COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 
 
-class Floors:
-    """Sensitivity floor and horizon of each scene.
+def floors_of(
+    sensitivity: list[File], horizon: Horizon
+) -> dict[str, tuple[np.ndarray, int | None]]:
+    """Map each scene to its sensitivity floor (F,) and its horizon; None: beyond the run.
 
-    The floor (F,) is the relative difference between full-order runs with perturbed and unperturbed
+    The floor is the relative difference between full-order runs with perturbed and unperturbed
     starts in each of F frames, the largest over all random seeds; it is empty without perturbed
     runs. The horizon is the first frame in which it exceeds a threshold; from there on runs cannot
-    be compared. Attribute ``of`` maps scenes to floors. StorageError for a damaged file.
+    be compared. Raises StorageError for a damaged file.
     """
-
-    def __init__(self, sensitivity: Sequence[File], horizon: Horizon) -> None:
-        self.perturbation, self.threshold = horizon.perturbation, horizon.threshold
-        tables = {file["scene"]: read_table(file.path, COLUMNS) for file in sensitivity}
-        self.of = {s: floor_of(table, s, self.perturbation) for s, table in tables.items()}
-
-    def horizon(self, scene: str) -> int | None:
-        """First frame where the sensitivity floor exceeds `threshold` in ``scene``, or None."""
-        end = horizon(self.of[scene], self.threshold)
-        return end if end < len(self.of[scene]) else None
+    found = {}
+    for file in sensitivity:
+        floor = floor_of(read_table(file.path, COLUMNS), file["scene"], horizon.perturbation)
+        end = horizon_of(floor, horizon.threshold)
+        found[file["scene"]] = floor, end if end < len(floor) else None
+    return found
 
 
 LOW, HIGH = 1e-12, 1e2
@@ -57,30 +54,30 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
     {sensitivity.threshold}: beyond it a reduced run cannot be judged by its error. Dashed lines are
     twins, scenes that end before.
     """
-    floors = Floors(sensitivity, horizon)
+    floors = floors_of(sensitivity, horizon)
     kinds: dict[str, list[str]] = {}
     for scene in drawn.scenes:
-        if len(floors.of[scene]):
+        if len(floors[scene][0]):
             kinds.setdefault(_kind(drawn, scene), []).append(scene)
     if not kinds:
-        raise NothingToDraw(f"no run perturbed by {floors.perturbation:g}")
+        raise NothingToDraw(f"no run perturbed by {horizon.perturbation:g}")
     columns = min(3, len(kinds))
     figure, axes = small_multiples(len(kinds), columns, height=2.7)
     for ax, (kind, scenes) in zip(axes, kinds.items(), strict=True):
         style.log_axis(ax, LOW, HIGH)
-        ax.axhline(floors.threshold, color=style.GREY, linewidth=0.9)
+        ax.axhline(horizon.threshold, color=style.GREY, linewidth=0.9)
         families = list(dict.fromkeys(scene.removesuffix(TWIN) for scene in scenes))
         for scene in scenes:
             family = families.index(scene.removesuffix(TWIN))
             colour = style.CYCLE[family % len(style.CYCLE)]
-            floor, end = floors.of[scene], floors.horizon(scene)
+            floor, end = floors[scene]
             label = f"{style.words(scene)}: {f'beyond {len(floor)}' if end is None else end}"
             line = "--" if scene.endswith(TWIN) else "-"
             shown = np.clip(floor, LOW, HIGH)
             ax.plot(np.arange(len(shown)), shown, color=colour, label=label, linestyle=line)
             if end is not None:
                 dot = {"marker": "o", "markersize": 4.5, "zorder": 5}
-                ax.plot([end], [floors.threshold], color=colour, **dot)
+                ax.plot([end], [horizon.threshold], color=colour, **dot)
         ax.set_title(kind)
         ax.legend(
             loc="upper center", bbox_to_anchor=(0.5, -0.31), fontsize=7.5, handlelength=1.6,
@@ -89,7 +86,7 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
         ax.set_xlabel("frame")
     label_outer(axes, columns, "frame", y="relative difference")
     handles = [
-        style.handle(f"threshold {floors.threshold:g}", color=style.GREY),
+        style.handle(f"threshold {horizon.threshold:g}", color=style.GREY),
         style.handle("horizon (frame given)", color="#555555", marker="o", linestyle="none"),
     ]
     style.legend(figure, handles, 2)

@@ -89,9 +89,8 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
     from matplotlib.patches import Rectangle
 
     look = LOOKS[str(found.outcome)]
-    ax.add_patch(
-        Rectangle((x, y), 1.0, 1.0, facecolor=look.face, edgecolor="#BBBBBB", linewidth=0.3)
-    )
+    edge = {"edgecolor": "#BBBBBB", "linewidth": 0.3}
+    ax.add_patch(Rectangle((x, y), 1.0, 1.0, facecolor=look.face, **edge))
     mark = f"{int(found.blowup_frame)}" if look.mark == "frame" else look.mark
     if mark:
         ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=6, color=look.ink)
@@ -166,10 +165,9 @@ def _wrapped(rows: dict[tuple[str, str], str], blocks: list[Block], xlabel: str)
     parts: list[list[Block]] = []
     used = 0
     for block in blocks if rows else ():
-        width = len(block[1])
-        if not parts or (used and used + width > CELLS):
+        used += len(block[1])
+        if not parts or used > CELLS:
             parts.append([])
-            used = 0
+            used = len(block[1])
         parts[-1].append(block)
-        used += width
     return [Strip(rows, part, xlabel) for part in parts]

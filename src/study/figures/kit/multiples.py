@@ -1,5 +1,7 @@
 """Figures of many small panels that share the y axis and a legend, and axes of times."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pdrom.view import style
@@ -40,6 +42,13 @@ def label_outer(axes: list[Axes], columns: int, x: str, y: str) -> None:
             ax.set_ylabel(y)
         if i + columns >= len(axes):
             ax.set_xlabel(x)
+
+
+def label_rows(ax: Axes, names: Sequence[str]) -> None:
+    """Label the rows of ``ax`` at y = 0, 1, 2, ..., from the top."""
+    ax.set_yticks(range(len(names)), [style.words(name) for name in names])
+    ax.set_ylim(len(names) - 0.4, -0.6)
+    ax.tick_params(axis="y", length=0)
 
 
 def time_axis(ax: Axes, times: np.ndarray) -> None:
