@@ -163,10 +163,9 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
         groups[-1].append(marker) if near else groups.append([marker])
     for group in groups:
         numbers = ", ".join(f"{count:.0f}" for _, _, count in group)
-        ax.annotate(
-            f"K = {numbers}", (group[0][0], min(height for _, height, _ in group)), (-2.5, -3.5),
-            textcoords="offset points", fontsize=6.5, ha="right", va="top",
-        )  # fmt: skip
+        at = (group[0][0], min(height for _, height, _ in group))
+        look = {"textcoords": "offset points", "fontsize": 6.5, "ha": "right", "va": "top"}
+        ax.annotate(f"K = {numbers}", at, (-2.5, -3.5), **look)
 
 
 def handles(found: TradeOffs) -> list[Block]:

@@ -43,6 +43,7 @@ OTHERS = ("#8C6D31", "#5A5A5A", "#B03A6B", "#2B2B80", "#3E8E7E", "#A0522D", "#7F
 MARKERS = "*dph8H|"  # for effects that are no constraint groups; each group has a fixed marker
 UNLISTED = "forces, holds, contacts"
 COLOURS = {UNLISTED: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
+TICK = {"linestyle": "none", "marker": "|", "markersize": 9, "markeredgewidth": 1.4}
 Looks = dict[str, tuple[str, str]]
 ACTING = (
     "cloth_all_oop spring_oop bend_curved strain_oop strain_poke_twin spring_twist_twin "
@@ -137,17 +138,14 @@ def _draw_times(ax: Axes, rows: pd.DataFrame, looks: Looks) -> None:
     for method, part in rows.groupby("method", sort=False):
         colour, marker = looks[str(method)]
         for quantity, (_, line) in CURVES.items():
-            ax.plot(
-                part.vertices, part[quantity].where(part[quantity] > 0.0), line, color=colour,
-                marker=marker if line == "-" else None, linewidth=1.3 if line == "-" else 0.9,
-            )  # fmt: skip
+            look = {"marker": marker, "linewidth": 1.3} if line == "-" else {"linewidth": 0.9}
+            time = part[quantity].where(part[quantity] > 0.0)
+            ax.plot(part.vertices, time, line, color=colour, **look)
         end = part.iloc[-1]
         if method in NAMES and end.exponent == end.exponent:
-            ax.annotate(
-                rf"$N^{{{end.exponent:.2f}}}$",
-                (end.vertices, end.ms_per_iteration), xytext=(5, 0),
-                textcoords="offset points", va="center", color=colour, fontsize=7.5,
-            )  # fmt: skip
+            at, look = (end.vertices, end.ms_per_iteration), {"va": "center", "fontsize": 7.5}
+            words = rf"$N^{{{end.exponent:.2f}}}$"
+            ax.annotate(words, at, (5, 0), textcoords="offset points", color=colour, **look)
 
 
 @figure(
@@ -175,10 +173,8 @@ def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
         for (_, method), curve in own.groupby(["scene", "method"], sort=False):
             colour, marker = styles[str(method)]
             curve = curve.sort_values("r")
-            ax.plot(
-                curve.r, curve.ratio, color=colour, marker=marker, markersize=2.6, linewidth=0.8,
-                alpha=0.75,
-            )  # fmt: skip
+            look = {"marker": marker, "markersize": 2.6, "linewidth": 0.8, "alpha": 0.75}
+            ax.plot(curve.r, curve.ratio, color=colour, **look)
         ax.set_xlim(left=0.0)
     label_outer(axes, COLUMNS, "basis vectors r", "reduced over full local step")
     one = style.handle("break-even", color=style.BLACK, linestyle="--")
@@ -220,10 +216,9 @@ def effects_contribution(drawn: Drawn, table: pd.DataFrame, contributions: list[
 
 def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
     """Map effects in ``rows`` to (colour, marker); those of a group are the same in all figures."""
-    known, effects = drawn.looks, list(dict.fromkeys(rows.effect))
-    others = [effect for effect in effects if effect not in known]
-    groups = {effect: known[effect] for effect in effects if effect in known}
-    looks = zip(cycle(OTHERS), cycle(MARKERS), strict=False)
+    effects, looks = dict.fromkeys(rows.effect), zip(cycle(OTHERS), cycle(MARKERS), strict=False)
+    groups = {effect: drawn.looks[effect] for effect in effects if effect in drawn.looks}
+    others = (effect for effect in effects if effect not in groups)
     return groups | dict(zip(others, looks, strict=False))
 
 
@@ -245,11 +240,9 @@ def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -
         ax.barh(y, floor - LOW, left=LOW, color="#DCD8D0", height=0.8, zorder=1)
         for row in own[own.moved.notna()].itertuples():
             colour, marker = looks[row.effect]
-            ax.plot(
-                [np.clip(row.moved, LOW, HIGH)], [y], marker=marker, markersize=4.5, zorder=3,
-                color=colour, markerfacecolor=colour if row.above_floor else "white",
-                clip_on=False,
-            )  # fmt: skip
+            look = {"markersize": 4.5, "zorder": 3, "color": colour, "clip_on": False}
+            look["markerfacecolor"] = colour if row.above_floor else "white"
+            ax.plot([np.clip(row.moved, LOW, HIGH)], [y], marker, **look)
     label_rows(ax, scenes)
     ax.set(xscale="log", xlim=(LOW, HIGH), xlabel="drift of the run without the effect")
     ax.grid(True)
@@ -277,8 +270,7 @@ def effects_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
     handles: list = [style.patch(style.words(part), color=colours[part]) for part in parts]
     if several:
         _draw_left_out(axes[1], rows, several[0])
-        tick = {"linestyle": "none", "marker": "|", "markersize": 9, "markeredgewidth": 1.4}
-        handles.append(style.handle("whole less its own cost", color=style.BLACK, **tick))
+        handles.append(style.handle("whole less its own cost", color=style.BLACK, **TICK))
     style.legend(figure, handles, 4)
     return figure
 
@@ -306,10 +298,7 @@ def _draw_left_out(ax: Axes, rows: pd.DataFrame, scene: str) -> None:
     for y, row in enumerate(rows.itertuples()):
         ax.barh(y, row.without_ms, color=shades.get(row.groups, "#5F90B2"), height=0.72)
         if row.ms_per_frame > 0.0:
-            ax.plot(
-                [whole - row.ms_per_frame], [y], marker="|", color=style.BLACK, markersize=9,
-                markeredgewidth=1.4,
-            )  # fmt: skip
+            ax.plot([whole - row.ms_per_frame], [y], color=style.BLACK, **TICK)
     label_rows(ax, [f"without {e}" if e != NOTHING else "whole" for e in rows.effect])
     ax.set(xlim=(0.0, 1.15 * float(rows.without_ms.max())), xlabel="time per frame (ms)")
     ax.set_title(style.words(scene))

@@ -44,9 +44,8 @@ def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
         raise NothingToDraw("no run with a gain")
     figure = style.new_figure(3.0)
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
-    ranges = runs[:0].reindex(
-        columns=[*_KEYS, *(f"{q}_{e}" for q in ("gain", "error") for e in ENDS)]
-    )
+    names = [*_KEYS, *(f"{q}_{e}" for q in ("gain", "error") for e in ENDS)]
+    ranges = runs[:0].reindex(columns=names)
     if len(repeated := tables["repetitions"]):
         repeated = repeated[repeated.varied == "training"]
         ranges = runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
@@ -259,11 +258,9 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
         ax.text(0.03, 0.04, text, transform=ax.transAxes, **words)
     ax.plot(component[above], shown[above], color=colour, linewidth=0.8)
     for mask, marks in ((above, {"color": colour}), (~above, HOLLOW | {"markeredgewidth": 0.5})):
+        dots = marks | {"linestyle": "none", "markersize": 2.8, "clip_on": False}
         if mask.any():
-            ax.plot(
-                component[mask], shown[mask], linestyle="none", marker=marker, markersize=2.8,
-                clip_on=False, **marks,
-            )  # fmt: skip
+            ax.plot(component[mask], shown[mask], marker=marker, **dots)
     ax.set_xlim(0, 1.02 * max(component.max(), 1.0))
 
 
@@ -295,11 +292,9 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
             ax.plot(output.num_points, error, color=PUBLISHED, linewidth=0.7, zorder=1)
         lines = [_draw_errors(ax, rows[rows.method == m], m) for m in methods]
         if not any(lines):
-            ax.text(
-                0.5, 0.5, "projections are round-off:\nno relative error exists",
-                transform=ax.transAxes, ha="center", va="center", color="#666666",
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 2},
-            )  # fmt: skip
+            words = "projections are round-off:\nno relative error exists"
+            look = {"ha": "center", "va": "center", "color": "#666666", "transform": ax.transAxes}
+            ax.text(0.5, 0.5, words, bbox={"fc": "white", "ec": "none", "pad": 2}, **look)
         ax.set_xlim(0, max(float(rows.r.max()), 1.0) * 1.02)
     label_outer([ax for ax, *_ in panels], 3, "basis size r", "relative error")
     handles = drawn.handles(declaration.method_styles(methods))
@@ -322,11 +317,9 @@ def _draw_errors(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
             continue
         drawn, train = True, split == "train"
         shown = np.clip(np.where(np.isfinite(error), error, np.nan), *SHOWN)
-        ax.plot(
-            line.r, shown, linestyle=dashes, color=colour, linewidth=1.2 if train else 0.9,
-            marker=marker if train else None, markersize=2.8,
-            markevery=max(1, len(shown) // 5), clip_on=False,
-        )  # fmt: skip
+        marks = {"marker": marker, "markersize": 2.8, "markevery": max(1, len(shown) // 5)}
+        look = {"linewidth": 1.2, **marks} if train else {"linewidth": 0.9}
+        ax.plot(line.r, shown, dashes, color=colour, clip_on=False, **look)
         above = error > SHOWN[1]
         if train and above.any():
             rim = np.full(above.sum(), SHOWN[1])

@@ -23,14 +23,8 @@ from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, camera_o
 from study.figures.kit.multiples import panels, rows_of
 from study.figures.kit.read import positions_at, read_samplings
 
-EARLIER = {
-    "markerfacecolor": "#FFFFFF", "markeredgecolor": style.BLACK, "markeredgewidth": 0.8,
-    "markersize": 3.0,
-}  # fmt: skip
-NEWEST = {
-    "markerfacecolor": "none", "markeredgecolor": style.SKY, "markeredgewidth": 1.6,
-    "markersize": 8.5,
-}  # fmt: skip
+EARLIER = {"mfc": "#FFFFFF", "mec": style.BLACK, "markeredgewidth": 0.8, "markersize": 3.0}
+NEWEST = {"mfc": "none", "mec": style.SKY, "markeredgewidth": 1.6, "markersize": 8.5}
 SEVERAL = "several"  # stands for x, y or z if entries of several axes of an element are sampled
 AXES = {"x": style.VERMILLION, "y": style.GREEN, "z": style.BLUE, SEVERAL: "#333333"}
 SCENES = f"strain_oop strain_twist_twin spring_stretch bar_release {MESHES}"

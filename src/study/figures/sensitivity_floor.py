@@ -78,12 +78,9 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
             if end is not None:
                 dot = {"marker": "o", "markersize": 4.5, "zorder": 5}
                 ax.plot([end], [horizon.threshold], color=colour, **dot)
-        ax.set_title(kind)
-        ax.legend(
-            loc="upper center", bbox_to_anchor=(0.5, -0.31), fontsize=7.5, handlelength=1.6,
-            labelspacing=0.25,
-        )  # fmt: skip
-        ax.set_xlabel("frame")
+        ax.set(title=kind, xlabel="frame")
+        look = {"fontsize": 7.5, "handlelength": 1.6, "labelspacing": 0.25}
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.31), **look)
     label_outer(axes, columns, "frame", y="relative difference")
     handles = [
         style.handle(f"threshold {horizon.threshold:g}", color=style.GREY),

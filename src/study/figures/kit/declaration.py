@@ -99,8 +99,7 @@ class Experiment(BaseModel, extra="forbid", frozen=True):
     @property
     def title(self) -> str:
         """Title of a panel; the group is named only if the scene reduces several groups."""
-        name = style.words(self.scene)
-        return name if self.only else f"{name}: {style.words(self.group)}"
+        return style.words(self.scene if self.only else f"{self.scene}: {self.group}")
 
     def find(self, files: Sequence[File], **labels: str) -> str | None:
         """First path in ``files`` for this scene, group, mesh and ``labels``; None without one."""
@@ -148,8 +147,7 @@ class Drawn(BaseModel, extra="forbid", frozen=True):
     @property
     def looks(self) -> dict[str, tuple[str, str]]:
         """Name of each constraint group -> (colour, marker)."""
-        looks = style.GROUP_LOOKS
-        return {group: looks[place % len(looks)] for place, group in enumerate(self.groups)}
+        return dict(zip(self.groups, cycle(style.GROUP_LOOKS), strict=False))
 
     def of(self, scene: str) -> list[Experiment]:
         """Experiments in ``scene``: one for each of its reduced constraint groups."""

@@ -66,17 +66,12 @@ class ElementMap:
             faces = np.sort(corners.reshape(-1, 3), axis=1).tolist()
             behind = {tuple(face): place // 4 for place, face in enumerate(faces)}
             return values[[behind[tuple(sorted(triangle))] for triangle in triangles.tolist()]]
-        if self.kind == "edge":
-            n, ends = self.mesh.vertices, self.cells.ravel()
-            total = np.bincount(ends, np.repeat(values, 2), minlength=n)
-            return (total / np.maximum(np.bincount(ends, minlength=n), 1))[triangles].mean(axis=1)
-        field = np.full(self.mesh.vertices, np.nan)
-        field[self.cells[:, 0]] = values
-        corners = field[triangles]
-        known = np.isfinite(corners)
-        total = np.where(known, corners, 0.0).sum(axis=1)
-        count = known.sum(axis=1)
-        return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+        ends, n = self.cells if self.kind == "edge" else self.cells[:, :1], self.mesh.vertices
+        total = np.bincount(ends.ravel(), np.repeat(values, ends.shape[1]), minlength=n)
+        with np.errstate(invalid="ignore"):  # NaN, 0 / 0, where there is no value
+            corners = (total / np.bincount(ends.ravel(), minlength=n))[triangles]
+            known = np.isfinite(corners)
+            return np.where(known, corners, 0.0).sum(axis=1) / known.sum(axis=1)
 
     def draw(
         self, ax: Axes, points: np.ndarray, values: np.ndarray, camera: Camera,
@@ -84,9 +79,8 @@ class ElementMap:
     ) -> None:  # fmt: skip
         """Draw the mesh at ``points`` (N, 3) m, elements coloured by ``values`` (e,)."""
         if self.kind == "edge" and not len(self.mesh.tetrahedra):
-            draw_surface(
-                ax, points, self.mesh, camera=camera, colour="#FFFFFF", wire=0.0, contrast=0.15
-            )
+            look = {"colour": "#FFFFFF", "wire": 0.0, "contrast": 0.15}
+            draw_surface(ax, points, self.mesh, camera=camera, **look)
             draw_lines(ax, points[self.cells], camera, colours=colours.to_rgba(values))
             return
         carried = self.face_values(values)
