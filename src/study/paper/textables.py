@@ -296,7 +296,7 @@ def scenes(
     """
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
     header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon", *MOTIONS]
-    yield rf"l{LEFT}p{{3cm}}rrrrrrr", header
+    yield rf"l{LEFT}p{{3.3cm}}rrrrrrr", header
 
     for row in scenes.itertuples():
         end = horizon.get(row.scene)
