@@ -92,10 +92,10 @@ ODD = "20:0 1_0 06 010 08 0x1F 0b11 -1_0.5 .5_0 1e0_5 1:30.5 !!int~'010' {b:~[7,
 
 @pytest.mark.parametrize("value", [value.replace("~", " ") for value in ODD.split()])
 def test_a_number_that_yaml_reads_as_another_is_named_as_it_is_written(tmp_path, value):
-    words = r"file\.yaml: a(\.b\.1)? = [^ ]*[\d_F]+: YAML reads it as .*; write a decimal number"
+    words = r"file\.yaml: aa(\.b\.1)? = [^ ]*[\d_F]+: YAML reads it as .*; write a decimal number"
     with pytest.raises(ConfigurationError, match=words):
-        read_yaml(written(tmp_path, f"a: {value}\n"))
-    command = ["--config", f"a={value}"]
+        read_yaml(written(tmp_path, f"aa: {value}\n"))
+    command = ["--config", f"aa={value}"]
     with pytest.raises(ConfigurationError, match=words.replace(r"file\.yaml", "--config")):
         CommandLine(command)
 
