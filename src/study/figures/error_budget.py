@@ -20,7 +20,7 @@ PARTS = {
     "full_order": ("full order, the scene's iterations", style.ORANGE, "x"),
 }
 ERRORS = {"error": "position error", "deformation_error": "deformation error"}
-APART = 0.25  # distance of two trajectories of a scene; scenes are 1 apart
+APART = 0.27  # distance of two trajectories of a scene; scenes are 1 apart
 
 
 @figure(title="Error budget of reduced models", reads={"table": TableOf("error_budget")})
@@ -34,7 +34,7 @@ def error_budget(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """
     table = table[table.skinning == 0]
     scenes = drawn.scenes_of(table, "no error budget")
-    figure = style.new_figure(0.24 * len(scenes) + 1.1)
+    figure = style.new_figure(0.18 * len(scenes) + 1.1)
     axes = figure.subplots(1, len(ERRORS), sharey=True, squeeze=False)[0]
     for ax, (column, label) in zip(axes, ERRORS.items(), strict=True):
         ax.set_xscale("log")
