@@ -214,13 +214,13 @@ def accuracy_cost(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> Figu
     label_iterations(ax, found, first)
     _draw_rates(ax)
     ax.set_title(f"{groups[first]}: {style.words(first)}")
-    ax.set(xlabel="time per frame (ms)", ylabel="relative error")
+    ax.set(xlabel="time per frame (ms)", ylabel="position error")
     if small:
         axes = parts[1].subplots(1, len(small), sharey=True, squeeze=False)[0]
         for ax, scene in zip(axes, small, strict=True):
             draw_panel(ax, found, scene, size=2.4)
             ax.set(title=f"{groups[scene]}:\n{style.words(scene)}", xlabel="time per frame (ms)")
-        axes[0].set_ylabel("relative error")
+        axes[0].set_ylabel("position error")
     top = 1.0
     for row, height in zip(rows, lines, strict=True):
         for place, (title, entries) in enumerate(row):
