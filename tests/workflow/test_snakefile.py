@@ -134,7 +134,8 @@ def test_one_figure_needs_no_more_than_its_own_inputs(clean):
     assert {p for p in planned if _stage(p) == "figures"} == {figure, figure[:-3] + "png"}
     stages = {_stage(path) for path in planned} - {"figures", "meshes"}
     assert stages == {
-        "fom", "snapshots", "pod", "sampling", "reruns", "sensitivity", "contributions",
+        "fom", "converged", "snapshots", "pod", "sampling", "reruns", "sensitivity",
+        "contributions",
     }  # fmt: skip
     assert _scenes(p for p in planned if _stage(p) in stages) == {"spring_stretch", "spring_twist"}
 
