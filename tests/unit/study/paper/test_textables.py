@@ -138,10 +138,11 @@ TABLES = {
 MADE = r"""
 % verdicts with their colour, and the tests that decide; a place without a figure is a table
 % claims
-C1 & 70 \% or more & \textcolor{okgreen}{holds} (1/2, 3/4) & \textcolor{okgrey}{depends} (0/0); both errors: holds
-  & figure~\ref{fig:local_share} \\
+C1 & 70 \% or more & \textcolor{okgreen}{holds} (1/2, 3/4) & \textcolor{okgrey}{depends} (0/0); both
+  errors: holds & figure~\ref{fig:local_share} \\
 C2 & x & \textcolor{okgrey}{cannot be decided} () & \textcolor{okgreen}{holds} () & \texttt{a} \\
-C3 & y & \textcolor{okred}{does not hold} (); both errors: depends & \textcolor{okred}{does not hold} () & \texttt{b} \\
+C3 & y & \textcolor{okred}{does not hold} (); both errors: depends
+  & \textcolor{okred}{does not hold} () & \texttt{b} \\
 % claims_in_full
 C1 as published & some\_one & $\ge$ 0.10 & 1 of 2 & 0.050 & 0.10 & \ensuremath{\infty} \\
  & others & $\ge$ 0.10 & 3 of 4 & 0 & 0.50 & 1 \\
@@ -186,8 +187,8 @@ C1 beyond & all & $\le$ 0.050 & 0 of 0 & -- & -- & -- \\
 \texttt{bar\_a} & edge spring & 400 & 20 & pays & -- \\
 % two digits of a count
 % speedups
-\texttt{bar\_a} & \texttt{deim\_x, r = 6} & 1.2 & 0.50 (loses) & 0.10 (0.25) & -- (--) & -- & 2 & 0.50
-  & never \\
+\texttt{bar\_a} & \texttt{deim\_x, r = 6} & 1.2 & 0.50 (loses) & 0.10 (0.25) & -- (--) & -- & 2
+  & 0.50 & never \\
 \texttt{b} & \texttt{ecsw, k = 20} & 8 & 66 to 73 & 0.010 (0.25) & 0.020 (--) & 0.50 & 1 & 3
   & 1200 \\
 % numbers of both errors, where they differ
