@@ -28,9 +28,9 @@ def error_budget(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Errors of 40 POD modes on the three test trajectories of each scene, from top to bottom:
     slower and displaced, kicked, softer. Both errors are against the converged run and before the
     horizon. From mark to mark one simplification is added: the subspace itself, the equations
-    restricted to it, sampled elements, few iterations. The cross is the full-order model with the
-    scene's iterations. A line without a mark of a part ends: the run blew up. Errors outside the
-    axes are drawn on their limits.
+    restricted to it, sampled elements, five iterations. The cross is the full-order model with the
+    scene's ten iterations. A line without a mark of a part ends: the run blew up. Errors outside
+    the axes are drawn on their limits.
     """
     table = table[table.skinning == 0]
     scenes = drawn.scenes_of(table, "no error budget")

@@ -56,7 +56,7 @@ def test_trajectories(references: list[File]) -> pd.DataFrame:
     columns=(
         *shared("scene"),
         MOTION,
-        integer("k", "POD modes of the training trajectory"),
+        integer("k", "POD modes that are asked for; a recording may hold fewer"),
         integer("skinning", "skinning columns beside them"),
         *shared("elements_sampled"),
         integer("frames", "frames that errors are taken over: those before the horizon"),

@@ -29,7 +29,9 @@ COLUMNS = (
     number(LOW, "the least of them"),
     number(HIGH, "the largest"),
     number(SHAPE, "median of their deformation errors; inf where a run ended"),
-    integer(COUNT, "held-out motions that were run, can be judged and are far enough"),
+    integer(
+        COUNT, "held-out motions that were run, have frames before the horizon and are far enough"
+    ),
     number("playback_error", "median error of playback on these motions, see reduced_reruns"),
 )
 # Held-out motions are left out if the training run differs from theirs by at most this (relative).
