@@ -1,4 +1,4 @@
-"""Where the error of a reduced model comes from: its columns, their closure, sampling, iterations.
+"""Error budget of a reduced model: what its columns, closure, sampling and iterations add.
 
 A model is run on test trajectories with one simplification after the other, and compared with the
 converged runs.

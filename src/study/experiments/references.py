@@ -33,7 +33,7 @@ COLUMNS = [
     "playback_error", "playback_deformation_error",
 ]  # fmt: skip
 FINER = 1e-2  # tolerance of the second solve over that of the first
-AFTER = 1e-4  # tolerance of frames after the horizon, which no error uses
+AFTER = 1e-4  # tolerance of frames after the horizon, over which no error is taken
 
 
 class Reference(ConfigModel):
@@ -118,7 +118,10 @@ def _errors(
 
 
 def _deformation(converged: Yardstick) -> dict[str, float | None]:
-    """How much of the displacement no rigid and no affine motion of the rest shape explains."""
+    """Return what the best rigid and affine motions of the rest shape leave, by column name.
+
+    Both are norms over all frames, relative to that of the displacement; None if nothing moves.
+    """
     scene, run = converged.scene, converged.reference
     root = np.sqrt(scene.masses / scene.masses.mean())[:, None]
     moved = float(np.linalg.norm(root * (run[1:] - run[0])))

@@ -29,8 +29,8 @@ def error_budget(drawn: Drawn, table: pd.DataFrame) -> Figure:
     slower and displaced, kicked, softer. Both errors are against the converged run and before the
     horizon. From mark to mark one simplification is added: the subspace itself, the equations
     restricted to it, sampled elements, five iterations. The cross is the full-order model with the
-    scene's ten iterations. A line without a mark of a part ends: the run blew up. Errors outside
-    the axes are drawn on their limits.
+    scene's ten iterations. A run that blew up has no mark. Errors outside the axes are drawn on
+    their limits.
     """
     table = table[table.skinning == 0]
     scenes = drawn.scenes_of(table, "no error budget")

@@ -116,7 +116,7 @@ def parsed(arguments: Sequence[str]) -> dict[str, Any]:
             if not Path(name).suffix:
                 fault = f"--configfile {name}: no YAML file"
     if fault:
-        more = ".venv/bin/snakemake --help explains the options; -- stands before targets"
+        more = ".venv/bin/snakemake --help explains the options; write -- before targets"
         raise ConfigurationError(f"{fault} ({more})")
     return found
 

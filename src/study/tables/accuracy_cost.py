@@ -165,8 +165,10 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
         MEASURE,
         REFERENCE,
         *shared("position_basis method"),
-        count("scenes", "scenes (and groups) with a timed run and a known enough reference"),
-        count("accurate", "those with a run within a tenth of the converged one"),
+        count(
+            "scenes", "scenes (and groups) with a timed run, whose reference is known well enough"
+        ),
+        count("accurate", "those with a run whose errors are at most a tenth"),
         timed(integer("pays", "those among them with an accurate run faster than the full order")),
         timed(integer("loses", "those whose accurate runs are all slower")),
         timed(number("best_speedup", "median over them of the fastest accurate run's speed-up")),

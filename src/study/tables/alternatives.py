@@ -72,7 +72,11 @@ MEASURES = (
         timed(number("offline_ratio", "time of its training over that of one plain frame")),
         integer("processes", "processes that timed it, all in the first motion"),
         number("error_implicit", "against the converged step", tolerance=ERROR_TOLERANCE),
-        number("deformation_error", "of the shapes, the same", tolerance=ERROR_TOLERANCE),
+        number(
+            "deformation_error",
+            "deformation error against the converged step",
+            tolerance=ERROR_TOLERANCE,
+        ),
         number("error_continuous", "against continuous time: the total", tolerance=ERROR_TOLERANCE),
         estimated(meaning="estimated error of that motion"),
         estimated(name="implicit_error", meaning="of the converged step, by a much finer solve"),

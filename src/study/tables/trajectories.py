@@ -34,10 +34,10 @@ MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIO
             "norm of what the best rigid motions of the rest shape leave of the converged run, "
             "over the norm of the displacement, in all frames",
         ),
-        number("affine", "the same of the best affine images", compared="error"),
+        number("affine", "the same, if the best affine motions are taken out", compared="error"),
         REFERENCE,
         number("replay_error", "position error if the training trajectory is replayed instead"),
-        number("replay_deformation_error", "its deformation error"),
+        number("replay_deformation_error", "deformation error of the replay"),
         number("full_order_error", "position error of the run with the scene's iterations"),
         number("full_order_deformation_error", "its deformation error"),
         *shared("reference_error reference_deformation_error"),

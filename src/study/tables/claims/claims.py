@@ -224,7 +224,13 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (one of `VARIED`, cha
         skipped("text", "condition", "what the verdict depends on"),
         skipped("text", "measured_beyond", "the same of sound variants on well-posed scenes"),
         timed(text("verdict_beyond", "the verdict there", compared="exact")),
-        timed(text("verdict_both", "as published, of position and deformation", compared="exact")),
+        timed(
+            text(
+                "verdict_both",
+                "as published, if the deformation error counts, too",
+                compared="exact",
+            )
+        ),
         timed(text("verdict_beyond_both", "the same of sound variants", compared="exact")),
         skipped("text", "condition_beyond", "what it depends on"),
         skipped("text", "why_beyond", "all tests there in words"),

@@ -81,7 +81,7 @@ def test_what_runs_no_job(arguments):
         ("--mode rubbish", ["--mode rubbish"]),
         ("--profile rubbish", ["profile", "rubbish"]),
         ("-n --config ranks=[6] x y", ["'x'", "name=value", "--"]),
-        ("--configfile a.yaml x --cores 2", ["--configfile x", "-- stands before targets"]),
+        ("--configfile a.yaml x --cores 2", ["--configfile x", "write -- before targets"]),
         ("--config ranks=1e_3", ["--config: ranks = 1e_3"]),
     ],
 )
