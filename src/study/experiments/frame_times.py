@@ -22,12 +22,13 @@ from pdrom.reduction.sampling import select
 from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.snapshots import load_snapshots
 from pdrom.reduction.subspace.model import SubspaceModel, load_models
+from pdrom.reduction.timing import Variant, model_variant
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Settings
 from study.experiments.kit.base import Modes, OfScene, PositionBasis, experiment
 from study.experiments.kit.costs import variant
-from study.experiments.kit.measurement import Processes, Variant, in_processes, model_variant
+from study.experiments.kit.measurement import Processes, in_processes
 from study.experiments.kit.runfiles import load_reduction
 
 FULL, CONTROL, REDUCED = "full", "control", "reduced"

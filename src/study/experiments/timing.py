@@ -27,6 +27,7 @@ from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.snapshots import recorded
 from pdrom.reduction.subspace.model import load_models
 from pdrom.reduction.subspace.training import make_columns, sampled_models
+from pdrom.reduction.timing import Variant, measure, model_variant
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings, SourcesOf
@@ -35,7 +36,7 @@ from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.costs import effect_costs, left_out, local_costs, variant
-from study.experiments.kit.measurement import Protocol, Variant, measure, model_variant
+from study.experiments.kit.measurement import Protocol
 
 
 class NumpyLocalStep:

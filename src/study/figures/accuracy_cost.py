@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.model.held_out import FIRST, PLAYBACK
+from pdrom.reduction.settings import pareto
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure, Line2D
 from study.artifact.reads import TableOf
@@ -14,7 +15,6 @@ from study.experiments.alternatives.experiment import REDUCTIONS
 from study.experiments.kit.base import ANDERSON, FOM
 from study.figures.kit.declaration import Drawn, NothingToDraw, figure
 from study.figures.kit.multiples import label_outer, rows_of, small_multiples, time_axis
-from study.tables.accuracy_cost import pareto
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"

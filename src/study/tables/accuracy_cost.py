@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from pdrom.reduction.settings import pareto
 from study.artifact import paths
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
@@ -91,14 +92,6 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     errors = errors.rename(columns={"error_converged": ERROR, "deformation_converged": DEFORMATION})
     points = errors.merge(cost, on=["scene", "method", "iterations"])
     return points.assign(position_basis="full", k=None, r=None).dropna(subset=_POINT)
-
-
-def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
-    """Whether points are Pareto-optimal: no other is as good in both values and better in one."""
-    return [
-        not any((e <= a) & (c <= b) & ((e < a) | (c < b)) for e, c in zip(error, cost, strict=True))
-        for a, b in zip(error, cost, strict=True)
-    ]
 
 
 # Columns that identify a curve (time of the local step over size r); its rows differ only in r.

@@ -4,6 +4,7 @@ import hashlib
 import json
 import logging
 import re
+from abc import ABC, abstractmethod
 from math import prod
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -55,12 +56,21 @@ _DIGITS = 32  # number of hexadecimal digits of a digest
 Count = Annotated[int, Field(ge=2, le=2000)]
 
 
-class GeneratedMesh(MeshModel):
+class GeneratedMesh(MeshModel, ABC):
     """Mesh of a regular grid; `sides` are the keys with the numbers of vertices along its sides."""
 
     sides: ClassVar[tuple[str, ...]]
     least: ClassVar[int]
     """Smallest number of vertices along a side of a coarsened mesh."""
+
+    @property
+    def axes(self) -> list[int]:
+        """Axes along which the sides of the grid lie (0: x), in no order."""
+        return [0, 1, 2]
+
+    @abstractmethod
+    def build(self, root: Path) -> Mesh:
+        """Return the mesh; ``root`` is ignored."""
 
     @model_validator(mode="after")
     def _not_too_large(self) -> Self:
@@ -75,6 +85,18 @@ class GeneratedMesh(MeshModel):
         """Return the mesh with ``factor`` times the vertices along each side, at least `least`."""
         sizes = {name: max(self.least, round(getattr(self, name) * factor)) for name in self.sides}
         return self.model_copy(update=sizes)
+
+    def with_cells(self, part: float) -> Mesh:
+        """Build the mesh with ``part`` of its cells along each side, stretched to the same size."""
+        counts = {name: 1 + round(part * (getattr(self, name) - 1)) for name in self.sides}
+        least = {name: max(self.least, count) for name, count in counts.items()}
+        own, coarse = (one.build(Path()) for one in (self, self.model_copy(update=least)))
+        points = coarse.points.copy()
+        for axis in self.axes:
+            low, high = own.points[:, axis].min(), own.points[:, axis].max()
+            x = points[:, axis]
+            points[:, axis] = low + (x - x.min()) * ((high - low) / (x.max() - x.min()))
+        return Mesh(points, coarse.triangles, coarse.tetrahedra)
 
 
 class ClothMesh(GeneratedMesh):
@@ -95,6 +117,10 @@ class ClothMesh(GeneratedMesh):
         return cloth(
             self.rows, self.columns, self.plane, extent=self.extent, lift=self.lift, wave=self.wave
         )
+
+    @property
+    def axes(self) -> list[int]:
+        return [0, 1] if self.plane == "xy" else [0, 2]
 
     @property
     def label(self) -> str:

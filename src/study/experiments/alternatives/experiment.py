@@ -28,6 +28,7 @@ from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import projector, reduced_state
 from pdrom.reduction.subspace.training import make_columns, sampled_models
+from pdrom.reduction.timing import Variant
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Setting, SourcesOf
 from study.experiments.alternatives.solvers.methods import WINDOW, TwoLevel, continuous
@@ -35,7 +36,7 @@ from study.experiments.alternatives.solvers.substeps import METHODS
 from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
-from study.experiments.kit.measurement import Processes, Variant, in_processes
+from study.experiments.kit.measurement import Processes, in_processes
 
 REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # names of the reduced methods
 TWO_LEVEL: Final = "two-level"  # full-order method whose coarse level is a trained subspace

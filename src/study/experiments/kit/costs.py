@@ -23,8 +23,8 @@ from pdrom.model.dynamics.stepper import LocalStep, Stepper
 from pdrom.model.effects.base import Effect
 from pdrom.model.scene import Scene
 from pdrom.reduction.sampling.local_step import ReducedLocalStep
+from pdrom.reduction.timing import Variant, measure, measure_calls, median_frames
 from study.experiments.kit.base import GLOBAL, REST, RIGHT
-from study.experiments.kit.measurement import Variant, measure, measure_calls, median_frames
 
 COLUMNS = [
     "scene", "group", "method", "vertices", "elements", "r", "local_ms", "full_ms", "solve_ms",

@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.store import read_table
+from pdrom.reduction.timing import PHASES
 from study.artifact.paths import File
-from study.experiments.kit.measurement import PHASES
 from study.tables.kit.declaration import Column, integer, number, text
 
 RESAMPLES, SEED, LEVEL = 2000, 1, 0.95

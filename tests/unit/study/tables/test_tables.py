@@ -12,10 +12,11 @@ from builders import frame
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.reduction.basis import Basis, save_basis
+from pdrom.reduction.settings import pareto
 from study.artifact import paths
 from study.artifact.paths import File
 from study.experiments.kit.base import Horizon
-from study.tables.accuracy_cost import accuracy_cost, pareto
+from study.tables.accuracy_cost import accuracy_cost
 from study.tables.effects_cost import local_share
 from study.tables.errors import sensitivity, singular_values
 from study.tables.kit.results import TRAIN, trained

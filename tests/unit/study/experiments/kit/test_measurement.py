@@ -8,9 +8,9 @@ import pytest
 
 from builders import GRAVITY, LEFT, make_scene
 from pdrom.model.dynamics.stepper import FrameReport, State
+from pdrom.reduction.timing import PHASES, Variant, measure, measure_calls
 from study.experiments.kit import costs as module
 from study.experiments.kit.base import GLOBAL, REST, RIGHT
-from study.experiments.kit.measurement import PHASES, Variant, measure, measure_calls
 
 
 class Clock:

@@ -1,0 +1,125 @@
+"""A scene on a coarser mesh, the first way to a faster simulation, and the error of a mesh."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy import sparse
+from scipy.optimize import brentq
+
+from pdrom.core.errors import SceneError
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.mesh.config import GeneratedMesh, GivenMesh
+from pdrom.model.mesh.transfer import interpolation
+from pdrom.model.mesh.types import Mesh
+from pdrom.model.scene import Scene
+
+ORDERS = (0.5, 3.0)  # observed orders of convergence for which `mesh_error` tells an error
+
+
+@dataclass(frozen=True, eq=False)
+class Coarser:
+    """A scene on a coarser mesh, whose displacements are interpolated to a finer one.
+
+    scene : the scene on the coarser mesh
+    fine : the finer mesh
+    matrix : (N, n) from values at the n coarse vertices to those at the N fine ones
+    """
+
+    scene: Scene
+    fine: Mesh
+    matrix: sparse.csr_array
+
+    def positions(self, y: np.ndarray) -> np.ndarray:
+        """Positions (N, 3) m of the fine vertices for ``y`` (n, 3) m of the coarse ones."""
+        return self.fine.points + self.matrix @ (y - self.scene.mesh.points)
+
+    @cached_property
+    def _back(self) -> sparse.csr_array:
+        return interpolation(self.fine, self.scene.mesh.points)
+
+    def state(self, state: State) -> State:
+        """Interpolate a ``state`` of the fine vertices at the coarse ones."""
+        moved, velocities = state.positions - self.fine.points, state.velocities
+        return State(self.scene.mesh.points + self._back @ moved, self._back @ velocities)
+
+
+def on_mesh(scene: Scene, mesh: Mesh) -> Coarser:
+    """Return ``scene`` on the coarser ``mesh``, with the same effects.
+
+    A coarse vertex gets the masses of the fine ones in the shares in which these take its
+    displacement, so that the mass and its centre stay.
+
+    Raises
+    ------
+    SceneError, MeshError
+        ``mesh`` has no fewer vertices, or one that no vertex of the scene is near to; an effect
+        does not suit it.
+    """
+    name, own = scene.config.name, scene.mesh
+    kinds = [bool(len(each.tetrahedra)) for each in (own, mesh)]
+    if mesh.vertices >= own.vertices or kinds[0] != kinds[1]:
+        what = "tetrahedra" if kinds[1] else "triangles"
+        raise SceneError(
+            f"scene '{name}': a mesh of {mesh.vertices} vertices and {what} is no coarser mesh of "
+            f"{own.vertices} vertices and {'tetrahedra' if kinds[0] else 'triangles'}"
+        )
+    matrix = interpolation(mesh, own.points)
+    masses = matrix.T @ scene.masses
+    if not masses.min() > 0.0:
+        raise SceneError(
+            f"scene '{name}': no vertex is near vertex {int(masses.argmin())} of the coarser mesh: "
+            "it must fill the same space and have larger elements everywhere"
+        )
+    changed = scene.config.model_copy(update={"mesh": GivenMesh.of(mesh)})
+    return Coarser(Scene.build(changed, mesh, masses), own, matrix)
+
+
+def grids(scene: Scene, parts: Sequence[float]) -> list[Coarser]:
+    """Return ``scene`` on grids with these ``parts`` of its cells along a side, the finest first.
+
+    Without a generated grid there are none; grids that are no coarser are left out.
+    """
+    config = scene.config.mesh
+    if not isinstance(config, GeneratedMesh):
+        return []
+    made = {mesh.vertices: mesh for mesh in (config.with_cells(part) for part in parts)}
+    coarser = sorted(size for size in made if size < scene.mesh.vertices)
+    return [on_mesh(scene, made[size]) for size in reversed(coarser)]
+
+
+def spacing(mesh: Mesh) -> float:
+    """Mean spacing of the vertices of ``mesh``, in a unit that two meshes of a body share."""
+    solid = len(mesh.tetrahedra)
+    return float(solid ** (-1 / 3) if solid else len(mesh.triangles) ** (-1 / 2))
+
+
+def mesh_error(spacings: Sequence[float], runs: Sequence[np.ndarray]) -> float | None:
+    """Estimate the error of the finest of three meshes, relative to the motion, by Richardson.
+
+    With an error C h^p of a mesh of spacing h, the differences of three runs tell C and p.
+
+    Parameters
+    ----------
+    spacings : of three meshes, the finest first
+    runs : (F + 1, N, 3) m each, converged, at the vertices of the finest mesh
+
+    Returns
+    -------
+    float or None
+        None if the observed order p is outside `ORDERS`, or nothing moves.
+    """
+    first, second, third = spacings
+    near, far = (float(np.linalg.norm(a - b)) for a, b in pairwise(runs))
+    moved = float(np.linalg.norm(runs[0] - runs[0][0]))
+
+    def excess(p: float) -> float:
+        return (third**p - second**p) * near - (second**p - first**p) * far
+
+    low, high = (excess(p) for p in ORDERS)
+    if not moved or not low * high < 0.0:
+        return None
+    p = brentq(excess, *ORDERS)
+    return near * first**p / (second**p - first**p) / moved

@@ -1,0 +1,129 @@
+"""Settings that simulate one scene, each a point of error and time: the trade-off of a scene.
+
+A setting is a method with its numbers: iterations of the full order, on the scene's own or on a
+coarser mesh, or a reduced model.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from pdrom.model.coarser import Coarser
+from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.runs import BLOWUP_EXTENT, BoundedRun
+from pdrom.model.scene import Scene
+from pdrom.reduction.deviations import Yardstick
+from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.space import reduced_state
+from pdrom.reduction.timing import Variant
+
+PLAIN, ANDERSON = "projective", "anderson"
+COARSER, COARSER_ANDERSON = "coarser-mesh", "coarser-mesh-anderson"
+ALL = 256  # Newton iterations of a frame that suffice for convergence
+Starts = tuple[tuple[State, int], ...]
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A method with its settings, ready to run on one scene.
+
+    labels : columns that tell it from others
+    loop, start : step loop and first state, in its unknowns
+    positions : function of the unknowns that returns the positions (N, 3) m of the scene's vertices
+    output : a faster form of it, which is timed; None: the unknowns are these positions
+    state : function that maps a state of all vertices to one of the unknowns
+    steps : number of steps (frames of ``loop``) into which a frame of the scene is divided
+    """
+
+    labels: dict[str, Any]
+    loop: Stepper
+    start: State
+    positions: Callable[[np.ndarray], np.ndarray] = _same
+    output: Callable[[np.ndarray], np.ndarray] | None = None
+    state: Callable[[State], State] = _same
+    steps: int = 1
+
+    def run(self, frames: int, extent: float) -> np.ndarray | None:
+        """Run it; return positions (F + 1, N, 3) m at the start and at the ends of F frames.
+
+        None if the run is not finite, or if a side of its bounding box exceeds `BLOWUP_EXTENT`
+        times the ``extent`` (m).
+        """
+        steps, limit = frames * self.steps, BLOWUP_EXTENT
+        run = BoundedRun(self.loop.run, self.start, steps, limit, extent, self.positions)
+        found = [self.positions(self.start.positions)]
+        with np.errstate(over="ignore", invalid="ignore"):
+            found += [f.positions for f in run if (f.number + 1) % self.steps == 0]
+        return None if run.blowup_frame is not None else np.stack(found)
+
+    def errors(self, truth: Yardstick) -> tuple[np.ndarray | None, float | None, float | None]:
+        """Run it over all frames of ``truth``; return positions, position and deformation error.
+
+        All three are None if the run blew up.
+        """
+        frames = len(truth.reference) - 1
+        found = self.run(frames, truth.scene.mesh.extent)
+        return (None, None, None) if found is None else (found, *truth.errors(found, frames))
+
+    def variant(self, labels: dict[str, Any], frames: int, starts: Starts = ()) -> Variant:
+        """Return it to be timed over ``frames`` frames, or over one from each state of ``starts``.
+
+        starts : pairs (state of all vertices, number of the next frame)
+        """
+        own = tuple((self.state(state), self.steps * frame) for state, frame in starts)
+        return Variant(
+            {**labels, **self.labels}, self.loop, self.start, frames * self.steps,
+            output=self.output, steps=self.steps, starts=own,
+        )  # fmt: skip
+
+
+def full_order(
+    scene: Scene, counts: Iterable[tuple[int, int]], coarser: Sequence[Coarser] = ()
+) -> Iterator[Setting]:
+    """Yield the full order of ``scene`` on its own mesh and on each coarser one.
+
+    counts : pairs (iterations of a frame, window of Anderson acceleration or 0)
+    """
+    counts = list(counts)
+    for mesh in (None, *coarser):
+        own = scene if mesh is None else mesh.scene
+        for count, window in counts:
+            names = (PLAIN, ANDERSON) if mesh is None else (COARSER, COARSER_ANDERSON)
+            method = names[window > 0]
+            labels = {"method": method, "iterations": count, "vertices": own.mesh.vertices}
+            yield loop_of(labels, own.iterated(count, window), mesh)
+
+
+def loop_of(
+    labels: dict[str, Any], scene: Scene, mesh: Coarser | None = None, steps: int = 1
+) -> Setting:
+    """Setting with the step loop of ``scene``, which is that of ``mesh`` if there is one."""
+    loop = scene.stepper(scene.system, track_objective=False)
+    start = scene.initial_state()
+    if mesh is None:
+        return Setting(labels, loop, start, steps=steps)
+    return Setting(labels, loop, start, mesh.positions, mesh.positions, mesh.state)
+
+
+def reduced(
+    labels: dict[str, Any], scene: Scene, model: SubspaceModel, iterations: int | None
+) -> Setting:
+    """Setting with ``model`` of the mesh of ``scene``; iterations None: converged, by Newton."""
+    loop, start = model.loop(scene.iterated(iterations or ALL), iterations is None)
+    state = partial(reduced_state, scene, model.columns)
+    return Setting(labels, loop, start, model.positions, model.output(), state)
+
+
+def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
+    """Whether points are Pareto-optimal: no other is as good in both values and better in one."""
+    return [
+        not any((e <= a) & (c <= b) & ((e < a) | (c < b)) for e, c in zip(error, cost, strict=True))
+        for a, b in zip(error, cost, strict=True)
+    ]
