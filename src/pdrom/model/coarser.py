@@ -4,19 +4,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.optimize import brentq
+from scipy.spatial import cKDTree
 
 from pdrom.core.errors import SceneError
 from pdrom.model.dynamics.stepper import State
+from pdrom.model.effects.base import effect_config
+from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import GeneratedMesh, GivenMesh
 from pdrom.model.mesh.transfer import interpolation
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene
 
 ORDERS = (0.5, 3.0)  # observed orders of convergence for which `mesh_error` tells an error
+APART = 0.25  # part of the longest side by which the boxes of two meshes of a body may differ
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +60,8 @@ def on_mesh(scene: Scene, mesh: Mesh) -> Coarser:
     Raises
     ------
     SceneError, MeshError
-        ``mesh`` has no fewer vertices, or one that no vertex of the scene is near to; an effect
-        does not suit it.
+        ``mesh`` is faulty, has no fewer vertices, fills another space, or has a vertex that no
+        vertex of the scene is near to; an effect does not suit it.
     """
     name, own = scene.config.name, scene.mesh
     kinds = [bool(len(each.tetrahedra)) for each in (own, mesh)]
@@ -66,6 +71,14 @@ def on_mesh(scene: Scene, mesh: Mesh) -> Coarser:
             f"scene '{name}': a mesh of {mesh.vertices} vertices and {what} is no coarser mesh of "
             f"{own.vertices} vertices and {'tetrahedra' if kinds[0] else 'triangles'}"
         )
+    check_mesh(mesh, f"scene '{name}': coarser mesh")
+    ends = [np.array([m.points.min(axis=0), m.points.max(axis=0)]) for m in (mesh, own)]
+    if np.abs(ends[0] - ends[1]).max() > APART * own.extent:
+        boxes = [", ".join(f"{a:.3g} to {b:.3g}" for a, b in each.T) for each in ends]
+        raise SceneError(
+            f"scene '{name}': the coarser mesh reaches from {boxes[0]} m (x, y, z), the scene's "
+            f"from {boxes[1]} m: it must fill the same space, with the same unit of length"
+        )
     matrix = interpolation(mesh, own.points)
     masses = matrix.T @ scene.masses
     if not masses.min() > 0.0:
@@ -73,8 +86,22 @@ def on_mesh(scene: Scene, mesh: Mesh) -> Coarser:
             f"scene '{name}': no vertex is near vertex {int(masses.argmin())} of the coarser mesh: "
             "it must fill the same space and have larger elements everywhere"
         )
-    changed = scene.config.model_copy(update={"mesh": GivenMesh.of(mesh)})
+    near = cKDTree(mesh.points).query(own.points)[1]
+    effects = [_selecting(each.model_dump(), near) for each in scene.config.effects]
+    found = tuple(effect_config(each, i) for i, each in enumerate(effects))
+    changed = scene.config.model_copy(update={"mesh": GivenMesh.of(mesh), "effects": found})
     return Coarser(Scene.build(changed, mesh, masses), own, matrix)
+
+
+def _selecting(keys: Any, near: np.ndarray, selects: bool = False) -> Any:
+    """Return ``keys`` of an effect; a vertex v that they select by number becomes near[v]."""
+    if isinstance(keys, dict):
+        return {k: _selecting(v, near, k in ("select", "of")) for k, v in keys.items()}
+    if not isinstance(keys, (list, tuple)):
+        return keys
+    if selects and all(isinstance(each, int) for each in keys):
+        return np.unique(near[list(keys)]).tolist()
+    return [_selecting(each, near, selects) for each in keys]
 
 
 def grids(scene: Scene, parts: Sequence[float]) -> list[Coarser]:

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from pdrom.model.mesh.types import Mesh
 
 FIRST = 16  # number of elements, nearest by their centres, that are tried first for a point
+PAIRS = 1 << 18  # points times elements that are compared at a time
 INSIDE = 1e-9  # part of the mesh: a point that is nearer to an element lies in it
 
 
@@ -21,20 +22,29 @@ def interpolation(mesh: Mesh, points: np.ndarray) -> sparse.csr_array:
     cells = mesh.tetrahedra if len(mesh.tetrahedra) else mesh.triangles
     corners = mesh.points[cells]
     centres = corners.mean(axis=1)
-    radius = float(np.linalg.norm(corners - centres[:, None], axis=2).max())
-    tree, count = cKDTree(centres), min(FIRST, len(cells))
-    chosen, weights = np.empty(len(points), np.int64), np.empty((len(points), cells.shape[1]))
-    left = np.arange(len(points))
-    while len(left):
-        far, near = tree.query(points[left], k=np.arange(1, count + 1))
-        found, distance = _nearest(corners[near], points[left])
-        best = distance.argmin(axis=1)
-        rows = np.arange(len(left))
-        chosen[left], weights[left] = near[rows, best], found[rows, best]
-        # an element that was not tried is no nearer than its centre less its radius
-        least = np.maximum(far[:, -1] - radius, INSIDE * mesh.extent)
-        left = left[distance[rows, best] > least] if count < len(cells) else left[:0]
-        count = min(4 * count, len(cells))
+    radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
+    chosen, weights = np.zeros(len(points), np.int64), np.empty((len(points), cells.shape[1]))
+    distance, least = np.full(len(points), np.inf), np.empty(len(points))
+    inside = INSIDE * mesh.extent
+    # elements of about one size at a time: a large one would widen the search among all
+    sizes = np.floor(np.log2(radii))
+    for own in (np.flatnonzero(sizes == size) for size in np.unique(sizes)):
+        tree, count, radius = cKDTree(centres[own]), min(FIRST, len(own)), radii[own].max()
+        left = np.flatnonzero(distance > inside)
+        while len(left):
+            for part in np.array_split(left, -(-len(left) * count // PAIRS)):
+                far, near = tree.query(points[part], k=np.arange(1, count + 1))
+                found, apart = _nearest(corners[own[near]], points[part])
+                best, rows = apart.argmin(axis=1), np.arange(len(part))
+                nearer = apart[rows, best] < distance[part]
+                rows, best, closer = rows[nearer], best[nearer], part[nearer]
+                chosen[closer], weights[closer] = own[near[rows, best]], found[rows, best]
+                distance[closer] = apart[rows, best]
+                # an element that was not tried is no nearer than its centre less its radius
+                least[part] = far[:, -1] - radius
+            more = count < len(own)
+            left = left[distance[left] > np.maximum(least[left], inside)] if more else left[:0]
+            count = min(4 * count, len(own))
     starts = cells.shape[1] * np.arange(len(points) + 1)
     shape = (len(points), mesh.vertices)
     return sparse.csr_array((weights.ravel(), cells[chosen].ravel(), starts), shape=shape)

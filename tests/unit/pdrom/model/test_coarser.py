@@ -1,0 +1,129 @@
+"""A scene on a coarser mesh: mass, motions, selections, refusals, and the error of a mesh."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from builders import GRAVITY, make_scene
+from pdrom.core.errors import MeshError, SceneError
+from pdrom.model import coarser
+from pdrom.model.dynamics.stepper import State
+from pdrom.model.mesh.generators import bar, cloth
+from pdrom.model.mesh.types import Mesh
+from pdrom.model.runs import trajectory
+
+BAR = {"kind": "bar", "nx": 9, "ny": 5, "nz": 4}
+BODY = {"effect": "deformation_gradient", "weight": 1e6}
+SPRING = {"effect": "spring", "weight": 1e4}
+MASSES = [{"density": 50.0}, {"select": "left", "density": 90.0}]
+
+
+def solid(*effects: dict, **settings: object):
+    return make_scene(GRAVITY, BODY, *effects, mesh=BAR, **settings)
+
+
+def test_grids_keep_the_box_the_mass_and_its_centre_the_finest_first():
+    scene = solid(masses=MASSES)
+    made = coarser.grids(scene, (0.25, 0.5, 1.0, 2.0))
+    assert [each.scene.mesh.vertices for each in made] == [5 * 3 * 3, 3 * 3 * 3]
+    for each in made:
+        own, mesh = each.scene, each.scene.mesh
+        assert np.ptp(mesh.points, axis=0) == pytest.approx(np.ptp(scene.mesh.points, axis=0))
+        assert own.masses.min() > 0.0
+        assert own.masses.sum() == pytest.approx(scene.masses.sum())
+        assert own.masses @ mesh.points == pytest.approx(scene.masses @ scene.mesh.points)
+    given = scene.changed(mesh=coarser.GivenMesh.of(scene.mesh))
+    assert coarser.grids(given, (0.5,)) == []
+
+
+def test_states_go_to_the_coarse_mesh_and_back_if_the_motion_is_affine(rng):
+    scene = solid()
+    (made,) = coarser.grids(scene, (0.5,))
+    slope, shift = rng.standard_normal((3, 3)), rng.standard_normal(3)
+    at = scene.mesh.points @ slope + shift
+    found = made.state(State(at, at))
+    assert made.positions(found.positions) == pytest.approx(at)
+    assert made.matrix @ found.velocities == pytest.approx(at)
+
+
+def test_a_held_side_moves_as_on_the_fine_mesh():
+    hold = {"effect": "translate", "select": "x_min", "offset": [0.1, 0.2, 0.0], "over": 5}
+    scene = solid(hold, frames=6)
+    (made,) = coarser.grids(scene, (0.5,))
+    side = scene.boundaries[0].vertices
+    runs = trajectory(scene), np.stack([made.positions(y) for y in trajectory(made.scene)])
+    assert runs[0][-1] != pytest.approx(scene.mesh.points, abs=0.05)
+    assert runs[1][:, side] == pytest.approx(runs[0][:, side])
+
+
+@pytest.mark.parametrize(
+    "select",
+    [[0, 5], {"kind": "union", "of": [[0], [5]]}, {"kind": "complement", "of": [*range(1, 5)]}],
+    ids=["list", "union", "complement"],
+)
+def test_vertices_selected_by_number_are_those_at_the_same_place(select):
+    sheet = {"kind": "cloth", "rows": 6, "columns": 6, "plane": "xz"}
+    scene = make_scene(SPRING, {"effect": "pins", "select": select}, mesh=sheet)
+    (made,) = coarser.grids(scene, (0.6,))
+    corners = scene.mesh.points[[0, 5]]
+    held = made.scene.mesh.points[made.scene.boundaries[0].vertices]
+    apart = np.linalg.norm(held - corners[:, None], axis=2).min(axis=1)
+    assert apart == pytest.approx(0.0, abs=1e-9)
+    assert isinstance(select, dict) or len(held) == 2
+
+
+def moved(mesh: Mesh, factor: float = 1.0, shift: float = 0.0) -> Mesh:
+    return replace(mesh, points=factor * mesh.points + shift)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "fault"),
+    [
+        (bar(9, 5, 4), "a mesh of 180 vertices and tetrahedra is no coarser mesh of 180 vertices"),
+        (cloth(5, 5), "25 vertices and triangles is no coarser mesh of 180 vertices and tetra"),
+        (moved(bar(5, 3, 3), 1e-3), "must fill the same space, with the same unit of length"),
+        (moved(bar(5, 3, 3), shift=9.0), "must fill the same space"),
+        (bar(41, 2, 2), "no vertex is near vertex"),
+    ],
+    ids=["as fine", "surface", "millimetres", "elsewhere", "finer along x"],
+)
+def test_a_mesh_that_is_no_coarser_one_is_refused(mesh, fault):
+    with pytest.raises(SceneError, match=fault) as error:
+        coarser.on_mesh(solid(), mesh)
+    assert str(error.value).startswith("scene 'test': ")
+
+
+def test_a_faulty_mesh_is_refused_as_one():
+    made = bar(5, 3, 3)
+    flat = replace(made, tetrahedra=np.vstack([made.tetrahedra, [[0, 1, 2, 2]]]))
+    with pytest.raises(MeshError, match="scene 'test': coarser mesh: "):
+        coarser.on_mesh(solid(), flat)
+
+
+@pytest.mark.parametrize("order", [0.6, 1.0, 2.0, 2.9])
+def test_the_error_of_a_mesh_is_exact_for_powers_of_its_spacing(order, rng):
+    moves, error = rng.standard_normal((2, 4, 10, 3))
+    moves[0] = error[0] = 0.0
+    spacings = [0.1, 0.17, 0.4]
+    runs = [moves + h**order * error for h in spacings]
+    exact = spacings[0] ** order * np.linalg.norm(error) / np.linalg.norm(runs[0])
+    assert coarser.mesh_error(spacings, runs) == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [0.3, 3.5, -1.0, None])  # None: at rest
+def test_other_orders_of_convergence_tell_no_error(order, rng):
+    runs = [
+        rng.standard_normal((2, 4, 3)) * (0.0 if order is None else h**order) for h in (1, 2, 4)
+    ]
+    first = np.zeros_like(runs[0])
+    error = rng.standard_normal((4, 3))
+    runs = [first + (0.0 if order is None else h**order) * error for h in (0.1, 0.2, 0.4)]
+    for run in runs:
+        run[0] = 0.0
+    assert coarser.mesh_error([0.1, 0.2, 0.4], runs) is None
+
+
+def test_spacings_of_two_meshes_of_a_body_have_the_ratio_of_their_edges():
+    for fine, coarse in ((bar(9, 9, 9), bar(5, 5, 5)), (cloth(9, 9), cloth(5, 5))):
+        assert coarser.spacing(coarse) == pytest.approx(2.0 * coarser.spacing(fine))
