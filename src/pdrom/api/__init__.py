@@ -3,6 +3,7 @@
 docs/library.md has a worked example.
 """
 
+from pdrom.api.cost import cost
 from pdrom.api.files import build_scene, load, load_scene, save
 from pdrom.api.model import Model, load_model
 from pdrom.api.pictures import plot, view
@@ -12,8 +13,8 @@ from pdrom.api.training import train
 from pdrom.core.errors import ConfigurationError
 
 __all__ = [
-    "Errors", "Model", "Run", "basis", "build_scene", "load", "load_model", "load_scene", "methods",
-    "plot", "run", "save", "train", "view",
+    "Errors", "Model", "Run", "basis", "build_scene", "cost", "load", "load_model", "load_scene",
+    "methods", "plot", "run", "save", "train", "view",
 ]  # fmt: skip
 
 

@@ -1,13 +1,17 @@
 """Plots of errors, and HTML pages that show runs."""
 
 import os
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from pdrom.api.cost import MODEL
 from pdrom.api.files import file_path, require_run
 from pdrom.api.records import Run
 from pdrom.core.errors import SceneError
 from pdrom.core.store import require_own
+from pdrom.reduction.settings import COARSER, COARSER_ANDERSON
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.frames import write_frames
@@ -57,6 +61,45 @@ def plot(reference: Run, *runs: Run) -> Figure:
         ax.set_ylabel("error of the positions")
         ax.legend(loc="upper left")
     return figure
+
+
+def plot_cost(table: pd.DataFrame) -> Figure:
+    """Plot position error against time of the settings in a ``table`` by `pdrom.api.cost`.
+
+    A line joins the best ones, a dashed line is the error of the mesh; a setting that blew up or
+    has no error is left out.
+    """
+    shown = table[np.isfinite(table.position_error)]
+    error = shown.position_error.clip(LOW, HIGH)
+    with style.look():
+        figure = style.new_figure(3.5)
+        ax = figure.subplots()
+        best = shown.best
+        ax.plot(shown.ms[best], error[best], color=style.GREY, zorder=1, label="best settings")
+        names = pd.Series([_place(row) for row in shown.itertuples()], shown.index, str)
+        for i, name in enumerate(names.unique()):
+            own = names == name
+            ax.scatter(shown.ms[own], error[own], color=style.CYCLE[i % 8], label=name)
+        for row, y in zip(shown.itertuples(), error, strict=True):
+            text = "converged" if pd.isna(row.iterations) else str(row.iterations)
+            text += " A" * ("Anderson" in row.setting)
+            ax.annotate(text, (row.ms, y), (3, 3), textcoords="offset points", fontsize=7)
+        if table.attrs["mesh_error"] is not None:
+            ax.axhline(
+                table.attrs["mesh_error"], color=style.BLACK, ls="--", label="error of the mesh"
+            )
+        ax.set(xscale="log", yscale="log", xlabel="ms a frame", ylabel="position error")
+        ax.grid(True)
+        style.legend(figure, ax.get_legend_handles_labels()[0], 3)
+    return figure
+
+
+def _place(row: Any) -> str:
+    """Name of the mesh or model that a ``row`` of a table by `pdrom.api.cost` simulates."""
+    if row.method == MODEL:
+        return style.plain_words(row.setting.rpartition(", ")[0])
+    coarser = "coarser mesh, " * (row.method in (COARSER, COARSER_ANDERSON))
+    return f"{coarser}{row.vertices:,} vertices"
 
 
 def view(path: str | os.PathLike[str], *runs: Run) -> None:

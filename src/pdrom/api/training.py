@@ -250,6 +250,13 @@ def _variations(scene: Scene, kind: str, count: int, seed: int) -> list[Scene]:
     return [Scene.build(config, scene.mesh, scene.masses) for config in configs]
 
 
+def converged_positions(scene: Scene, progress: Progress) -> np.ndarray | None:
+    """Positions (F + 1, N, 3) m of ``scene`` with converged frames; None if one does not."""
+    tick = progress(f"{scene.config.name}, converged", scene.config.frames)
+    own = UNNOTICED * scene.config.time_step**2 / scene.mesh.extent
+    return converged_run(scene, min(CONVERGED, max(own, ROUNDOFF)), EVALUATIONS, tick)
+
+
 def _reference(scene: Scene, converged: bool, progress: Progress) -> Run:
     """Full-order run of ``scene``; NotReducibleError if it shall be ``converged`` and is not."""
     name, frames = scene.config.name, scene.config.frames
@@ -257,9 +264,7 @@ def _reference(scene: Scene, converged: bool, progress: Progress) -> Run:
         return run(scene, on_frame=progress(name, frames))
     started = perf_counter()
     log.info("%s: solving every frame to convergence", name)
-    tick = progress(f"{name}, converged", frames)
-    own = UNNOTICED * scene.config.time_step**2 / scene.mesh.extent
-    found = converged_run(scene, min(CONVERGED, max(own, ROUNDOFF)), EVALUATIONS, tick)
+    found = converged_positions(scene, progress)
     if found is None:
         raise NotReducibleError(
             f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations; "

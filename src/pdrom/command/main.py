@@ -18,7 +18,7 @@ from pdrom.core import checkout
 from pdrom.core.environment import settle
 from pdrom.core.errors import INTERRUPTED, PdromError, choices, reason
 
-COMMANDS = ("new", "run", "train", "view", "show")
+COMMANDS = ("new", "run", "train", "cost", "view", "show")
 CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;
 2 the command was not understood; 3 a reduced run blew up (its file is written all the
 same); 130 interrupted"""
@@ -117,5 +117,6 @@ def main() -> None:
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     logging.basicConfig(format="%(message)s")
-    logging.getLogger("pdrom.api").setLevel(logging.INFO)
+    for name in ("pdrom.api", "pdrom.reduction.timing"):
+        logging.getLogger(name).setLevel(logging.INFO)
     sys.exit(run(sys.argv[1:]))

@@ -109,7 +109,7 @@ def loop_of(
     start = scene.initial_state()
     if mesh is None:
         return Setting(labels, loop, start, steps=steps)
-    return Setting(labels, loop, start, mesh.positions, mesh.positions, mesh.state)
+    return Setting(labels, loop, start, mesh.positions, mesh.positions, mesh.state, steps)
 
 
 def reduced(
