@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from time import perf_counter, process_time
 from typing import Any
@@ -13,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.api import files
-from pdrom.api.model import BUSY, Model, load_model, silent
+from pdrom.api.model import BUSY, Model, OnFrame, load_model, silent
 from pdrom.api.training import EVALUATIONS, Progress, converged_positions
 from pdrom.core.errors import ConfigurationError, NotReducibleError, PdromError, SolverError
 from pdrom.core.yamlfile import shown
@@ -174,10 +175,13 @@ def _mesh_error(
         return None
     runs, spacings = [reference], [spacing(meshes[0].fine)]
     for mesh in (meshes[0], meshes[-1]):
-        size = f" on {mesh.scene.mesh.vertices:,} vertices"
-        found = converged_positions(mesh.scene, lambda name, n, size=size: progress(name + size, n))
+        found = converged_positions(mesh.scene, partial(_on, progress, mesh.scene.mesh.vertices))
         if found is None:
             return None
         runs.append(np.stack([mesh.positions(y) for y in found]))
         spacings.append(spacing(mesh.scene.mesh))
     return mesh_error(spacings, runs)
+
+
+def _on(progress: Progress, vertices: int, name: str, frames: int) -> OnFrame:
+    return progress(f"{name} on {vertices:,} vertices", frames)
