@@ -18,6 +18,7 @@ from pdrom.model.mesh.checks import check_mesh
 from pdrom.model.mesh.config import GeneratedMesh, GivenMesh
 from pdrom.model.mesh.transfer import interpolation
 from pdrom.model.mesh.types import Mesh
+from pdrom.model.runs import converged_run
 from pdrom.model.scene import Scene
 
 ORDERS = (0.5, 3.0)  # observed orders of convergence for which `mesh_error` tells an error
@@ -44,6 +45,11 @@ class Coarser:
     @cached_property
     def _back(self) -> sparse.csr_array:
         return interpolation(self.fine, self.scene.mesh.points)
+
+    def converged(self, tolerance: float, limit: int) -> np.ndarray | None:
+        """Positions (F + 1, N, 3) m of the fine vertices in `converged_run` of the coarse scene."""
+        run = converged_run(self.scene, tolerance, limit)
+        return None if run is None else np.stack([self.positions(y) for y in run])
 
     def state(self, state: State) -> State:
         """Interpolate a ``state`` of the fine vertices at the coarse ones."""
@@ -123,24 +129,34 @@ def spacing(mesh: Mesh) -> float:
     return float(solid ** (-1 / 3) if solid else len(mesh.triangles) ** (-1 / 2))
 
 
-def mesh_error(spacings: Sequence[float], runs: Sequence[np.ndarray]) -> float | None:
-    """Estimate the error of the finest of three meshes, relative to the motion, by Richardson.
+def mesh_error(
+    scene: Scene,
+    run: np.ndarray | None,
+    coarser: Sequence[Coarser],
+    runs: Sequence[np.ndarray | None],
+) -> float | None:
+    """Estimate the error of the scene's mesh, relative to the motion, by Richardson's rule.
 
     With an error C h^p of a mesh of spacing h, the differences of three runs tell C and p.
 
     Parameters
     ----------
-    spacings : of three meshes, the finest first
-    runs : (F + 1, N, 3) m each, converged, at the vertices of the finest mesh
+    run : (F + 1, N, 3) m, converged, on the scene's mesh
+    coarser, runs : coarser meshes, and converged runs on them at the scene's vertices; the first
+        and the last are used
 
     Returns
     -------
     float or None
-        None if the observed order p is outside `ORDERS`, or nothing moves.
+        None if one of the runs is missing, nothing moves, or p is outside `ORDERS`.
     """
-    first, second, third = spacings
-    near, far = (float(np.linalg.norm(a - b)) for a, b in pairwise(runs))
-    moved = float(np.linalg.norm(runs[0] - runs[0][0]))
+    ends = [runs[i] for i in (0, -1)] if len(runs) > 1 else [None]
+    known = [own for own in (run, *ends) if own is not None]
+    if len(known) < 3:
+        return None
+    first, second, third = (spacing(s.mesh) for s in (scene, coarser[0].scene, coarser[-1].scene))
+    near, far = (float(np.linalg.norm(a - b)) for a, b in pairwise(known))
+    moved = float(np.linalg.norm(known[0] - known[0][0]))
 
     def excess(p: float) -> float:
         return (third**p - second**p) * near - (second**p - first**p) * far

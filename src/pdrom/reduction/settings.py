@@ -72,27 +72,31 @@ class Setting:
         found = self.run(frames, truth.scene.mesh.extent)
         return (None, None, None) if found is None else (found, *truth.errors(found, frames))
 
-    def variant(self, labels: dict[str, Any], frames: int, starts: Starts = ()) -> Variant:
+    def variant(
+        self, labels: dict[str, Any], frames: int, starts: Starts = (), warm: int | None = None
+    ) -> Variant:
         """Return it to be timed over ``frames`` frames, or over one from each state of ``starts``.
 
         starts : pairs (state of all vertices, number of the next frame)
+        warm : number of frames of an unmeasured run; None for ``frames``
         """
-        own = tuple((self.state(state), self.steps * frame) for state, frame in starts)
+        own, steps = tuple((self.state(s), self.steps * n) for s, n in starts), self.steps
+        warm = None if warm is None else warm * steps
         return Variant(
-            {**labels, **self.labels}, self.loop, self.start, frames * self.steps,
-            output=self.output, steps=self.steps, starts=own,
+            {**labels, **self.labels}, self.loop, self.start, frames * steps, output=self.output,
+            steps=steps, starts=own, warm=warm,
         )  # fmt: skip
 
 
 def full_order(
-    scene: Scene, counts: Iterable[tuple[int, int]], coarser: Sequence[Coarser] = ()
+    scene: Scene, counts: Iterable[tuple[int, int]], meshes: Sequence[Coarser | None] = (None,)
 ) -> Iterator[Setting]:
-    """Yield the full order of ``scene`` on its own mesh and on each coarser one.
+    """Yield the full order of ``scene`` on each of ``meshes``; None is its own.
 
     counts : pairs (iterations of a frame, window of Anderson acceleration or 0)
     """
     counts = list(counts)
-    for mesh in (None, *coarser):
+    for mesh in meshes:
         own = scene if mesh is None else mesh.scene
         for count, window in counts:
             names = (PLAIN, ANDERSON) if mesh is None else (COARSER, COARSER_ANDERSON)

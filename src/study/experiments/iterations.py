@@ -1,5 +1,10 @@
-"""Error of runs with K local/global iterations per frame, against the limit K -> infinity."""
+"""Error of runs with K local/global iterations per frame, against the limit K -> infinity.
 
+The runs are on the scene's mesh and on coarser ones.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Annotated
 
 import pandas as pd
@@ -7,39 +12,53 @@ from pydantic import Field
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.runs import followed
-from pdrom.model.scene import SceneConfig
+from pdrom.model.coarser import Coarser, grids, mesh_error
+from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.deviations import Yardstick
+from pdrom.reduction.settings import (
+    ANDERSON,
+    COARSER_ANDERSON,
+    PLAIN,
+    Setting,
+    full_order,
+)
 from study.artifact import paths
-from study.artifact.reads import Setting
+from study.artifact.reads import Setting as Configured
 from study.experiments.kit import base as kit
 from study.experiments.kit.base import experiment
 from study.experiments.references import converged_positions
 
-COLUMNS = ["scene", "iterations", "window", "frames", "error_converged", "deformation_converged"]
+COLUMNS = [
+    "scene", "iterations", "window", "vertices", "frames", "error_converged",
+    "deformation_converged", "mesh_error",
+]  # fmt: skip
+NAMES = {PLAIN: kit.FOM, ANDERSON: kit.ANDERSON}  # of methods, in tables of the study
+COARSE, MOST = 1e-6, 4000  # tolerance of converged coarse runs; evaluations of a frame
 
 
 class IterationCounts(ConfigModel):
-    """Section ``iterations``: numbers of local/global iterations per frame of full-order runs.
+    """Section ``iterations``: full-order settings beside that of the scene.
 
-    Numbers in ``counts`` above 2 are also run with Anderson acceleration of window
-    ``anderson_window``, unless 0.
+    counts, coarser_counts : local/global iterations of a frame, on the own and on coarser meshes
+    anderson_window : numbers of iterations above 2 are also run with this window, unless it is 0
+    coarser : parts of the cells along a side that the coarser meshes have
     """
 
     counts: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = (1, 2, 5, 10, 20, 40)
+    coarser_counts: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = (2, 5, 10)
     anderson_window: Annotated[int, Field(ge=0, le=50)] = 5
+    coarser: kit.Parts = kit.PARTS
 
 
 @experiment(
     "Accuracy of {scene} against the number of iterations",
     reads={
         "mesh": paths.MESH,
-        "fom": paths.TRAIN,
         "converged": paths.CONVERGED.where(run="train"),
         "sensitivity": paths.SENSITIVITY,
-        "config": Setting("scene"),
-        "asked": Setting("iterations"),
-        "horizon": Setting("horizon"),
+        "config": Configured("scene"),
+        "asked": Configured("iterations"),
+        "horizon": Configured("horizon"),
     },
     writes={"out": paths.ITERATIONS},
 )
@@ -50,27 +69,42 @@ def iterations(
     out: paths.File,
     **files: paths.File,
 ) -> None:
-    """Run a scene with every number K of iterations, until its horizon.
+    """Run a scene with every setting until its horizon; write errors against the converged run.
 
-    A row has the errors for one K against the converged run; they are empty without such a run.
+    They are empty without such a run. The own setting has the error of the mesh, too.
     """
     scene = kit.scene_of(config, files["mesh"])
     frames = max(1, horizon.frames(files["sensitivity"]))
+    scene = scene.changed(frames=frames)
     limit = converged_positions(files["converged"], frames)
-    rows: list[tuple[object, ...]] = []
-    counts = sorted({*asked.counts, config.iterations})
-    for count, window in accelerated(counts, asked.anderson_window):
-        errors: tuple[float | None, ...] = (None, None)
-        if limit is not None:
-            if (count, window) == (config.iterations, config.anderson_window):
-                reached = kit.positions_of(files["fom"], frames)
-            else:
-                loop = scene.iterated(count, window).stepper(scene.system, track_objective=False)
-                reached = followed(loop, scene.initial_state(), frames)
-            errors = Yardstick(scene, limit).errors(reached, frames)
-        rows.append((config.name, count, window, frames, *errors))
-    table = pd.DataFrame(rows, columns=COLUMNS).astype({"iterations": "Int64", "window": "Int64"})
+    truth, rows = None if limit is None else Yardstick(scene, limit), []
+    for setting in settings(scene, asked):
+        row = {"scene": config.name, "frames": frames, **setting.labels}
+        accelerates = setting.labels["method"] in (kit.ANDERSON, COARSER_ANDERSON)
+        row["window"] = asked.anderson_window * accelerates
+        if truth is not None:
+            _, row["error_converged"], row["deformation_converged"] = setting.errors(truth)
+        rows.append(row)
+    coarser = grids(scene, asked.coarser)
+    runs = [mesh.converged(COARSE, MOST) for mesh in coarser]
+    table = pd.DataFrame(rows, columns=COLUMNS)
+    own = (table.iterations == config.iterations) & (table.window == 0)
+    table.loc[own & (table.vertices == scene.mesh.vertices), "mesh_error"] = mesh_error(
+        scene, limit, coarser, runs
+    )
     write_table(table, out.path)
+
+
+def settings(scene: Scene, asked: IterationCounts) -> Iterator[Setting]:
+    """Yield the full order of ``scene`` with all numbers of iterations, on all meshes."""
+    coarse = grids(scene, asked.coarser)
+    counts = sorted({*asked.counts, scene.config.iterations}), sorted(asked.coarser_counts)
+    places: tuple[Sequence[Coarser | None], ...] = ((None,), coarse)
+    for meshes, numbers in zip(places, counts, strict=True):
+        pairs = accelerated(numbers, asked.anderson_window)
+        for each in full_order(scene, pairs, meshes):
+            method = each.labels["method"]
+            yield replace(each, labels={**each.labels, "method": NAMES.get(method, method)})
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:

@@ -31,7 +31,8 @@ from pdrom.reduction.timing import Variant, measure, model_variant
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings, SourcesOf
-from study.experiments.iterations import IterationCounts, accelerated
+from study.experiments.iterations import IterationCounts
+from study.experiments.iterations import settings as full_order_settings
 from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
@@ -156,7 +157,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     name, frames = scene.config.name, min(asked.frames, scene.config.frames)
     common = {"scene": name, "vertices": scene.mesh.vertices, "iterations": scene.config.iterations}
     slow, quick = _full_order(scene, frames, asked, common)
-    quick += _other_counts(scene, frames, settings.iterations, common)
+    quick += _other_settings(scene, frames, settings.iterations, common)
     common["implementation"] = "compiled"
     alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
     sizes = (*settings.ranks, *asked.breakeven)
@@ -206,20 +207,17 @@ def _full_order(
     return replace(slow, share=slow.loop.iterations / whole), made
 
 
-def _other_counts(
+def _other_settings(
     scene: Scene, frames: int, asked: IterationCounts, common: dict[str, Any]
 ) -> list[Variant]:
-    """Full-order runs with iteration counts other than the scene's, or Anderson acceleration."""
-    variants = []
-    counts = sorted({*asked.counts, scene.config.iterations})
-    own = (scene.config.iterations, scene.config.anderson_window)
-    for count, size in accelerated(counts, asked.anderson_window):
-        if (count, size) != own:
-            method = kit.ANDERSON if size else kit.FOM
-            labels = {"method": method, "iterations": count, "implementation": "compiled"}
-            loop = scene.iterated(count, size).stepper(scene.system, track_objective=False)
-            variants.append(Variant(common | labels, loop, scene.initial_state(), frames))
-    return variants
+    """Full-order runs with other settings than the scene's: iterations, acceleration, meshes."""
+    common = {**common, "implementation": "compiled"}
+    own = {"method": kit.FOM, **{key: common[key] for key in ("iterations", "vertices")}}
+    return [
+        each.variant(common, frames)
+        for each in full_order_settings(scene, asked)
+        if each.labels != own
+    ]
 
 
 class SizedBreakEven(ConfigModel):

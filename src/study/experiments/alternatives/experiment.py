@@ -1,13 +1,14 @@
-"""Time of every method on one scene, and its errors against two references.
+"""Error and time of every setting that simulates a scene, on its own mesh and on coarser ones.
 
 The first reference is the scene's implicit time step, solved to convergence, which methods approach
 with more iterations. The second is the motion in continuous time: a user wants this motion, and the
-implicit step deviates from it. All methods run the held-out motions; only subspaces are trained.
+implicit step deviates from it. All settings run the held-out motions; only subspaces are trained.
+Where reduced models are chosen, they and all others run validation motions, too.
 """
 
 import logging
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
 from typing import Annotated, Any, Final, Literal
@@ -18,34 +19,54 @@ from pydantic import Field
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
+from pdrom.model.coarser import Coarser, grids, mesh_error
 from pdrom.model.constraints.base import GroupConfig
-from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
-from pdrom.model.held_out import FIRST, MOTIONS, PLAYBACK
-from pdrom.model.runs import BLOWUP_EXTENT, BoundedRun, converged_run, trajectory
+from pdrom.model.held_out import MOTIONS, PLAYBACK
+from pdrom.model.runs import converged_run, trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.deviations import Yardstick
+from pdrom.reduction.settings import (
+    ANDERSON,
+    COARSER,
+    COARSER_ANDERSON,
+    PLAIN,
+    Setting,
+    full_order,
+    loop_of,
+    reduced,
+)
 from pdrom.reduction.subspace.model import SubspaceModel
-from pdrom.reduction.subspace.space import projector, reduced_state
 from pdrom.reduction.subspace.training import make_columns, sampled_models
 from pdrom.reduction.timing import Variant
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
-from study.artifact.reads import Setting, SourcesOf
-from study.experiments.alternatives.solvers.methods import WINDOW, TwoLevel, continuous
-from study.experiments.alternatives.solvers.substeps import METHODS
+from study.artifact.reads import Setting as Configured
+from study.artifact.reads import SourcesOf
+from study.experiments.alternatives.solvers.methods import (
+    WINDOW,
+    Chebyshev,
+    Explicit,
+    TwoLevel,
+    continuous,
+    measured_rate,
+)
 from study.experiments.kit import base as kit
 from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import Processes, in_processes
 
-REDUCED, ACCELERATED = REDUCTIONS = "ecsw", "ecsw-anderson"  # names of the reduced methods
+SAMPLED, NEWTON = REDUCTIONS = "ecsw", "ecsw-newton"  # names of the reduced methods
 TWO_LEVEL: Final = "two-level"  # full-order method whose coarse level is a trained subspace
-TRAINED: Final = (TWO_LEVEL, *REDUCTIONS)
 CONVERGED: Final = "converged"  # name of the reference: the implicit step solved to convergence
+COARSE: Final = (COARSER, COARSER_ANDERSON)
 TRAINING: Final = "training"  # key in `Comparison.work` for runs on which reductions are trained
+ACCELERATED: Final = {PLAIN: 0, COARSER: 0, ANDERSON: WINDOW, COARSER_ANDERSON: WINDOW}
 
 # Columns of tables that together identify a candidate (a method with its settings) in a scene.
-SETTING: Final = ["method", "substeps", "iterations", "training_motions", "k"]
+SETTING: Final = [
+    "method", "vertices", "substeps", "iterations", "training_motions", "k", "skinning",
+    "tolerance",
+]  # fmt: skip
 
 Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
 Work = Annotated[int, Field(ge=1, le=10**12, description="vertices times steps")]
@@ -53,8 +74,9 @@ Steps = Annotated[
     tuple[kit.Count, kit.Count], Field(description="substeps of a frame, iterations of each")
 ]
 Method = Literal[
-    "projective", "anderson", "chebyshev", "explicit", "two-level", "ecsw", "ecsw-anderson"
-]
+    "projective", "anderson", "chebyshev", "chebyshev-power", "explicit", "two-level",
+    "coarser-mesh", "coarser-mesh-anderson",
+]  # fmt: skip
 
 
 # The motion in continuous time is computed by explicit steps, `EXPLICIT_STEPS` per frame in the
@@ -63,12 +85,12 @@ EXPLICIT_STEPS, CONTINUOUS_TOLERANCE = 40, 1e-4
 # Frames of training runs converge to this part of the mesh; projections are evaluated up to `MOST`
 # times in a frame, also of the implicit reference, whose error a `FINER` times finer solve tells.
 TRAINING_TOLERANCE, MOST, FINER = 1e-5, 4000, 100.0
-# Sampling tolerances of reductions, and of the coarse level of the two-level method.
-TAU, COARSE_TAU = 1e-2, 5e-3
+COARSE_TAU = 5e-3  # sampling tolerance of the coarse level of the two-level method
+VALIDATION = 1_000_000  # first seed of validation motions, far from those of training motions
 
 
 class ContinuousReference(ConfigModel):
-    """Largest product (``limit``) of vertices and explicit steps of a frame."""
+    """Largest product (``limit``) of vertices and explicit steps of a frame; none is run beyond."""
 
     limit: Work = 2_400_000
 
@@ -79,26 +101,46 @@ class ImplicitReference(ConfigModel):
     tolerance: kit.Tolerance = 1e-7
 
 
+class ReducedModel(ConfigModel):
+    """A reduced model with sampled elements, trained on each number of motions, and how it runs.
+
+    iterations : local/global iterations of a frame, or "converged" (by Newton's method)
+    """
+
+    modes: kit.Modes = 40
+    skinning: Annotated[int, Field(ge=0, le=1000)] = 0
+    tolerance: kit.Tolerance = 1e-2
+    training_motions: Annotated[tuple[Annotated[int, Field(ge=1, le=64)], ...], Field(min_length=1)]
+    iterations: tuple[kit.Count | Literal["converged"], ...] = (5, "converged")
+
+    @property
+    def columns(self) -> tuple[int, int]:
+        """Numbers of POD modes and of skinning columns."""
+        return self.modes, self.skinning
+
+
 class Comparison(Processes):
     """Settings of the comparison of methods on one scene and one mesh.
 
-    Each of ``processes`` new processes times ``frames`` frames of the first held-out motion.
+    Each of ``processes`` new processes times ``frames`` frames spread over each held-out motion.
 
     stiffness : scene -> factors by which its groups' weights are multiplied; 1 without an entry
     steps : method -> pairs (substeps of a frame, iterations of each substep)
+    coarser : parts of the cells along a side that coarser meshes have
     work : method -> largest product vertices x substeps x iterations (for ``training``: vertices x
         motions); runs with more work are left out
-    modes : numbers of modes of reductions
-    training_motions : numbers of motions on which reductions are trained, the scene's motion first
+    models : reduced models, whose training motions begin with the scene's motion
+    seconds : length of all runs, s
+    validation : number of motions on which models are chosen
     """
 
     stiffness: dict[str, Factors] = Field(default_factory=dict)
     steps: dict[Method, tuple[Steps, ...]] = Field(default_factory=dict)
+    coarser: kit.Parts = kit.PARTS
     work: dict[Method | Literal["converged", "training"], Work] = Field(default_factory=dict)
-    modes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)] = (40,)
-    training_motions: Annotated[
-        tuple[Annotated[int, Field(ge=1, le=64)], ...], Field(min_length=1)
-    ] = (1, 2, 4, 8)
+    models: tuple[ReducedModel, ...] = (ReducedModel(training_motions=(1, 2)),)
+    seconds: Annotated[float, Field(gt=0.0, le=1e4)] = 2.0
+    validation: Annotated[int, Field(ge=0, le=64)] = 0
     implicit: ImplicitReference = ImplicitReference()
     continuous: ContinuousReference = ContinuousReference()
     frames: kit.Count = 20
@@ -119,181 +161,100 @@ class Comparison(Processes):
 
 
 class Alternatives(Comparison):
-    """Section ``alternatives`` of the configuration.
+    """Section ``alternatives``: in addition, ``scenes`` and what differs in single ones.
 
     scenes : scene -> factors by which its mesh gets more vertices along a side, with equal mass
-    errors : largest allowed errors; the table ``winners`` has a row for each of them
+    choice : "scene/factor" -> models from which one is chosen, in place of ``models``
     """
 
     scenes: kit.Sizes = Field(default_factory=dict)
-    errors: tuple[kit.Tolerance, ...] = (1e-1, 1e-2, 1e-3)
+    choice: dict[str, tuple[ReducedModel, ...]] = Field(default_factory=dict)
 
 
-TIME_COLUMNS = ["scene", "factor", "stiffness", *SETTING, "process", "ms_per_frame", "vertices_ms"]
 log = logging.getLogger(__name__)
+LABELS = ["scene", "factor", "stiffness", "motion"]
+TIME_COLUMNS = [*LABELS, *SETTING, "process", "ms_per_frame", "vertices_ms"]
 COLUMNS = [
-    "scene", "factor", "vertices", "stiffness", "method", "substeps", "iterations",
-    "training_motions", "offline_s", "k", "elements_sampled", "training_residual", "motion",
-    "frames", "finite", "error_implicit", "deformation_error", "error_continuous", "span_error",
-    "reference_error", "implicit_error", "implicit_deformation_error",
+    *LABELS, *SETTING, "offline_s", "elements_sampled", "training_residual", "frames", "finite",
+    "error_implicit", "deformation_error", "error_continuous", "reference_error", "implicit_error",
+    "implicit_deformation_error", "mesh_error",
 ]  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Trained:
-    """A reduced model, trained on a number of motions, for a number of substeps of a frame.
+    """A reduced model, trained on a number of motions, and the ``iterations`` that it runs with.
 
-    seconds : processor time of the training and of its full-order runs, s
+    labels : columns of tables that describe it
     coarse : whether the model is the coarse level of the two-level method
     """
 
-    motions: int
-    substeps: int
+    labels: dict[str, object]
     model: SubspaceModel
-    seconds: float
+    iterations: tuple[int | str, ...] = ()
     coarse: bool = False
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A method with its settings, ready to run on one scene.
-
-    steps : number of steps (frames of ``loop``) into which a frame of the scene is divided
-    model : the reduction in whose position subspace the method runs; None without one
-    """
-
-    labels: dict[str, object]
-    loop: Stepper
-    start: State
-    steps: int = 1
-    model: SubspaceModel | None = None
-
-    def state(self, state: State, scene: Scene) -> State:
-        """Convert ``state`` of all vertices to coordinates in the method's subspace, if any."""
-        return state if self.model is None else reduced_state(scene, self.model.columns, state)
-
-    def run(self, frames: int, extent: float) -> np.ndarray | None:
-        """Run the method; return positions (F + 1, N, 3) m at the start and at the ends of frames.
-
-        None is returned if the run is not finite, or if a side of its bounding box exceeds
-        `BLOWUP_EXTENT` times the ``extent`` (m).
-        """
-        loop, steps, limit = self.loop.run, frames * self.steps, BLOWUP_EXTENT
-        positions = (lambda y: y) if self.model is None else self.model.positions
-        run = BoundedRun(loop, self.start, steps, limit, extent, positions)
-        found = [positions(self.start.positions)]
-        found += [f.positions for f in run if (f.number + 1) % self.steps == 0]
-        return None if run.blowup_frame is not None else np.stack(found)
-
-
-def candidates(
-    scene: Scene, models: Sequence[Trained], settings: Comparison
-) -> Iterator[Candidate]:
-    """Yield every method with each pair (substeps, iterations) in ``settings``, for ``scene``.
-
-    ``models`` were trained by `trained` on other motions than that of ``scene``.
-    """
-    systems: dict[int, GlobalSystem] = {}
-    start, reduced = scene.initial_state(), []
-    for method in settings.steps:
-        for substeps, iterations in settings.pairs(method, scene.mesh.vertices):
-            labels = dict[str, object](method=method, substeps=substeps, iterations=iterations)
-            if method in TRAINED:
-                reduced.append((method, substeps, iterations, labels))
-                continue
-            if substeps not in systems:
-                step = scene.config.time_step / substeps
-                systems[substeps] = GlobalSystem(scene.masses, step, scene.groups)
-            loop = METHODS.load(method)(scene, substeps, iterations, systems[substeps])
-            yield Candidate(labels, loop, start)
-    for own in models:
-        sizes: dict[str, object] = {"training_motions": own.motions, "k": own.model.columns.modes}
-        sizes |= {"offline_s": own.seconds, "elements_sampled": own.model.elements_evaluated(scene)}
-        sizes["training_residual"] = own.model.residual
-        for method, substeps, iterations, labels in reduced:
-            if substeps != own.substeps or own.coarse != (method == TWO_LEVEL):
-                continue
-            if own.coarse:
-                level = TwoLevel(scene, substeps, iterations, own.model)
-                yield Candidate(labels | sizes, level, start)
-                continue
-            window = WINDOW if method == ACCELERATED else 0
-            other = substepped(scene, substeps, iterations, window)
-            yield Candidate(labels | sizes, *own.model.loop(other), substeps, own.model)
-
-
-def trained(training: Scene, settings: Comparison) -> Iterator[Trained]:
-    """Yield models in position subspaces with sampled elements, trained on one or more motions.
-
-    The first motion is that of ``training``, others are random variants of it. POD modes of every
-    n-th converged frame of n motions span a subspace; its elements are sampled once for each number
-    of substeps. The coarse level of the two-level method is trained only for the smallest n.
-    """
-    vertices = training.mesh.vertices
-    taken, coarse = (
-        sorted({n for m in methods for n, _ in settings.pairs(m, vertices)})
-        for methods in (REDUCTIONS, (TWO_LEVEL,))
-    )
-    scenes, runs, spent = [training], list[np.ndarray](), 0.0
-    for count in sorted(settings.training_motions) if taken or coarse else ():
-        if not settings.affords(TRAINING, count * vertices):
-            continue
-        started = process_time()
-        while len(scenes) < count:
-            further = training.config.training_variant(len(scenes))
-            scenes.append(Scene.build(further, training.mesh))
-        for scene in scenes[len(runs) :]:
-            run = converged_run(scene, TRAINING_TOLERANCE, MOST)
-            if run is None:
-                log.warning("%s: a training motion does not converge", training.config.name)
-                return
-            runs.append(run[1:])
-        spent += process_time() - started
-        for k in settings.modes:
-            started = process_time()
-            frames = np.concatenate([run[::count] for run in runs])
-            columns = make_columns([training], frames, k)
-            in_columns = process_time() - started
-            for substeps in sorted({*taken, *coarse}):
-                started = process_time()
-                level = count == min(settings.training_motions) and substeps in coarse
-                tolerances = [TAU, *([COARSE_TAU] if level else [])]
-                split = [substepped(s, substeps, s.config.iterations) for s in scenes]
-                ends = np.arange(substeps - 1, split[0].config.frames, substeps)
-                made = sampled_models(split, columns, ends, tolerances)
-                seconds = spent + in_columns + process_time() - started
-                for tau, model in dict(zip(tolerances, made, strict=True)).items():
-                    yield Trained(count, substeps, model, seconds, coarse=tau != TAU)
-
-
-def substepped(scene: Scene, substeps: int, iterations: int, window: int = 0) -> Scene:
-    """Return the scene with each frame split into ``substeps`` frames of ``iterations`` each.
-
-    Effects keep their times in seconds. ``window`` is the number of iterates in Anderson
-    acceleration, 0 for none.
-    """
-    config = scene.config
-    if substeps > 1:
-        scene = scene.changed(
-            time_step=config.time_step / substeps,
-            frames=substeps * config.frames,
-            effects=tuple(e.with_frames_scaled(substeps) for e in config.effects),
-        )
-    return scene.iterated(iterations, window)
-
-
-@dataclass(frozen=True)
-class Timed:
-    """A scene with the motion to time, its reduced models, and ``labels`` of the measured times."""
+class Case:
+    """A scene with one motion, its coarser meshes, its models, and the settings to compare."""
 
     labels: dict[str, object]
     scene: Scene
+    coarser: tuple[Coarser, ...]
     models: tuple[Trained, ...]
-    settings: Comparison
+    section: Comparison
+
+    def settings(self) -> Iterator[Setting]:
+        """Yield every setting, ready to run; models were trained on other motions."""
+        yield from self._full_order()
+        for own in self.models:
+            common = {**own.labels, "substeps": 1}
+            if own.coarse:
+                for substeps, count in self._pairs(TWO_LEVEL):
+                    labels = {**common, "method": TWO_LEVEL, "iterations": count}
+                    loop = TwoLevel(self.scene, substeps, count, own.model)
+                    yield Setting(labels, loop, self.scene.initial_state())
+            for iterations in own.iterations:
+                asked = None if isinstance(iterations, str) else iterations
+                labels = {**common, "method": SAMPLED if asked else NEWTON, "iterations": asked}
+                yield reduced(labels, self.scene, own.model, asked)
+
+    def _full_order(self) -> Iterator[Setting]:
+        for method, window in ACCELERATED.items():
+            pairs = self._pairs(method)
+            once = [(count, window) for substeps, count in pairs if substeps == 1]
+            meshes: tuple[Coarser | None, ...] = self.coarser if method in COARSE else (None,)
+            for own in full_order(self.scene, once, meshes):
+                yield replace(own, labels={**own.labels, "substeps": 1})
+            for substeps, count in pairs if method not in COARSE else ():
+                if substeps > 1:
+                    scene = substepped(self.scene, substeps).iterated(count, window)
+                    yield loop_of(self._labels(method, substeps, count), scene, steps=substeps)
+        scene, start = self.scene, self.scene.initial_state()
+        rates = {"chebyshev": None, "chebyshev-power": measured_rate}
+        for method, rate in rates.items():
+            for substeps, count in self._pairs(method):
+                step = scene.config.time_step / substeps
+                system = GlobalSystem(scene.masses, step, scene.groups)
+                loop = Chebyshev(scene, substeps, count, system)
+                loop.rate = loop.rate if rate is None else rate(scene)
+                yield Setting(self._labels(method, substeps, count), loop, start)
+        for substeps, count in self._pairs("explicit"):
+            labels = self._labels("explicit", substeps, count)
+            yield Setting(labels, Explicit(scene, substeps, count), start)
+
+    def _pairs(self, method: str) -> list[tuple[int, int]]:
+        return self.section.pairs(method, self.scene.mesh.vertices)
+
+    def _labels(self, method: str, substeps: int, iterations: int) -> dict[str, object]:
+        vertices = self.scene.mesh.vertices
+        labels = {"method": method, "vertices": vertices, "substeps": substeps}
+        return {**labels, "iterations": iterations}
 
     def variants(self) -> Iterator[Variant]:
-        """Yield the step loops of all methods with all settings, to be timed."""
-        scene, wanted = self.scene, min(self.settings.frames, self.scene.config.frames)
+        """Yield the step loops of all settings, to be timed."""
+        scene, wanted = self.scene, min(self.section.frames, self.scene.config.frames)
         places = np.linspace(0, scene.config.frames - 1, wanted).round().astype(int)
         # One frame for each set of active boundary conditions comes first: an unmeasured run of
         # these factorises all matrices, so that no measured frame has to.
@@ -302,48 +263,109 @@ class Timed:
         places = np.concatenate([places[first], np.delete(places, first)])
         loop, states = scene.stepper(track_objective=False), [scene.initial_state()]
         states += [end for end, _ in loop.run(states[0], range(scene.config.frames))]
-        for each in candidates(scene, self.models, self.settings):
-            labels = {**self.labels, **each.labels, "steps": each.steps}
-            output = None if each.model is None else each.model.output()
-            starts = tuple((each.state(states[f], scene), f * each.steps) for f in places)
-            yield Variant(
-                labels, each.loop, each.start, wanted * each.steps, steps=each.steps, starts=starts,
-                output=output, warm=len(first) * each.steps,
-            )  # fmt: skip
+        starts = tuple((states[frame], int(frame)) for frame in places)
+        for each in self.settings():
+            yield each.variant(self.labels, wanted, starts, len(first))
+
+
+def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
+    """Yield models in position subspaces with sampled elements, trained on one or more motions.
+
+    The first motion is that of ``training``, others are random variants of it. POD modes of every
+    n-th converged frame of n motions span a subspace, in which its elements are sampled. The coarse
+    level of the two-level method is trained on the first motion.
+    """
+    vertices = training.mesh.vertices
+    scenes, runs, spent = [training], list[np.ndarray](), 0.0
+    for count in sorted({n for model in section.models for n in model.training_motions}):
+        if not section.affords(TRAINING, count * vertices):
+            continue
+        started = process_time()
+        while len(scenes) < count:
+            further = training.config.training_variant(len(scenes))
+            scenes.append(Scene.build(further, training.mesh, training.masses))
+        for scene in scenes[len(runs) :]:
+            run = converged_run(scene, TRAINING_TOLERANCE, MOST)
+            if run is None:
+                log.warning("%s: a training motion does not converge", training.config.name)
+                return
+            runs.append(run[1:])
+        spent += process_time() - started
+        frames = np.concatenate([run[::count] for run in runs])
+        asked = [model for model in section.models if count in model.training_motions]
+        for modes, skinning in dict.fromkeys(model.columns for model in asked):
+            started = process_time()
+            columns = make_columns([training], frames, modes, skinning)
+            own = [model for model in asked if model.columns == (modes, skinning)]
+            level = count == 1 and model_of(section, TWO_LEVEL) and own[0] is section.models[0]
+            tolerances = [m.tolerance for m in own] + [COARSE_TAU] * bool(level)
+            made = sampled_models(scenes, columns, np.arange(len(runs[0])), tolerances)
+            seconds = spent + process_time() - started
+            log.info("%d motions, %d + %d columns: %.0f s", count, modes, skinning, seconds)
+            for tolerance, model, spec in zip(tolerances, made, [*own, None], strict=False):
+                labels: dict[str, object] = {
+                    "vertices": vertices, "training_motions": count, "k": columns.modes,
+                    "skinning": skinning, "tolerance": tolerance, "offline_s": seconds,
+                    "elements_sampled": model.elements_evaluated(training),
+                    "training_residual": model.residual,
+                }  # fmt: skip
+                yield Trained(labels, model, spec.iterations if spec else (), coarse=spec is None)
+
+
+def model_of(section: Comparison, method: Method) -> bool:
+    """Whether ``section`` asks for ``method``."""
+    return bool(section.steps.get(method))
+
+
+def substepped(scene: Scene, substeps: int) -> Scene:
+    """Return the scene with each frame split into ``substeps``; effects keep their seconds."""
+    config = scene.config
+    return scene.changed(
+        time_step=config.time_step / substeps,
+        frames=substeps * config.frames,
+        effects=tuple(e.with_frames_scaled(substeps) for e in config.effects),
+    )
 
 
 @experiment(
     "Alternatives to projective dynamics in {scene} with {factor} times the vertices along a side",
     reads={
         "sources": SourcesOf("scene.mesh"),
-        "config": Setting("scene"),
-        "section": Setting("alternatives"),
+        "config": Configured("scene"),
+        "section": Configured("alternatives"),
     },
     writes={"out": ALTERNATIVES, "times": ALTERNATIVE_TIMES},
     alone=True,
 )
 def alternatives(
-    sources: list[Path], config: SceneConfig, section: Comparison, out: File, times: File
+    sources: list[Path], config: SceneConfig, section: Alternatives, out: File, times: File
 ) -> None:
-    """Compare all methods on the mesh with ``out["factor"]`` times the vertices along a side."""
+    """Compare all settings on the mesh with ``out["factor"]`` times the vertices along a side."""
     factor = float(out["factor"])
-    rows, cases = [], []
+    rows, timed = [], []
+    chosen = section.choice.get(f"{config.name}/{factor:g}")
+    validation = section.validation if chosen else 0
+    section = section.model_copy(update={"models": chosen or section.models})
     for stiffness in section.factors(config.name, factor):
         finer = sized(config, factor, stiffness)
+        finer = finer.model_copy(update={"frames": round(section.seconds / finer.time_step)})
         training = Scene.build(finer, finer.mesh.build(Path()))
         models = tuple(trained(training, section))
         recorded = trajectory(training, track_objective=False)
-        own = {"scene": config.name, "factor": factor, "stiffness": stiffness}
-        for motion in MOTIONS:
-            scene = Scene.build(finer.heldout_variant(motion), training.mesh)
-            for row in _rows(scene, recorded, models, section):
-                rows.append({**own, "motion": motion, **row})
-            if motion == FIRST:
-                cases.append(Timed(own, scene, models, section).variants)
+        configs = {str(motion): finer.heldout_variant(motion) for motion in MOTIONS}
+        for number in range(validation):
+            configs[f"validation_{number + 1}"] = finer.training_variant(VALIDATION + number)
+        for motion, variant in configs.items():
+            scene = Scene.build(variant, training.mesh, training.masses)
+            labels = {"scene": config.name, "factor": factor, "stiffness": stiffness}
+            labels["motion"] = motion
+            case = Case(labels, scene, tuple(grids(scene, section.coarser)), models, section)
+            rows += [{**labels, **row} for row in _rows(case, recorded, motion in MOTIONS)]
+            if motion in MOTIONS:
+                timed.append(case.variants)
         log.info("%s: stiffness %g done", config.name, stiffness)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
-    measured = pd.DataFrame(in_processes(cases, section))
-    measured[["ms_per_frame", "vertices_ms"]] *= measured.steps.to_numpy()[:, None]
+    measured = pd.DataFrame(in_processes(timed, section))
     write_table(measured.reindex(columns=TIME_COLUMNS), times.path)
 
 
@@ -359,60 +381,57 @@ def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
     return finer.model_copy(update={"vertex_mass": mass, "effects": effects})
 
 
-def _rows(
-    scene: Scene, recorded: np.ndarray, models: tuple[Trained, ...], section: Comparison
-) -> Iterator[dict[str, Any]]:
-    """Yield rows with errors of runs in the motion of ``scene``, one row for each run.
+def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[dict[str, Any]]:
+    """Yield rows with errors of runs in the motion of ``case``, one row for each run.
 
-    The first is the converged implicit step, the second the ``recorded`` training motion, shown
-    instead. Errors against the implicit step are None if a frame of it did not converge or its work
-    exceeds the limit in ``section``. Runs that blew up have no errors (None) at all.
+    The first are the converged implicit step on all meshes and the ``recorded`` training motion,
+    shown instead. Errors against the implicit step are None if a frame of it did not converge or
+    its work exceeds the limit in the section. Runs that blew up have no errors (None) at all. Only
+    a ``test`` motion is compared with the motion in continuous time and with a finer solve.
     """
-    name, vertices = scene.config.name, scene.mesh.vertices
-    frames, implicit = scene.config.frames, None
-    limit = section.continuous.limit // vertices
-    exact = continuous(scene, frames, CONTINUOUS_TOLERANCE, EXPLICIT_STEPS, limit)
-    log.info("%s: %d explicit steps a frame, error %.1e", name, exact.substeps, exact.error)
-    if not exact.error <= CONTINUOUS_TOLERANCE:
-        log.warning("%s: motion in continuous time is known to %.1e only", name, exact.error)
-    if section.affords(CONVERGED, vertices):
-        implicit = converged_run(scene, section.implicit.tolerance, MOST)
+    scene, section = case.scene, case.section
+    frames, implicit, exact = scene.config.frames, None, None
+    common: dict[str, Any] = {"frames": frames}
+    if test and EXPLICIT_STEPS * scene.mesh.vertices <= section.continuous.limit:
+        limit = section.continuous.limit // scene.mesh.vertices
+        exact = continuous(scene, frames, CONTINUOUS_TOLERANCE, EXPLICIT_STEPS, limit)
+        common["reference_error"] = exact.error
+        if not exact.error <= CONTINUOUS_TOLERANCE:
+            log.warning("%s: continuous time is known to %.1e only", scene.config.name, exact.error)
+    tolerance = section.implicit.tolerance
+    if section.affords(CONVERGED, scene.mesh.vertices):
+        implicit = converged_run(scene, tolerance, MOST)
         if implicit is None:
-            log.warning("%s: no convergence in %d evaluations", name, MOST)
-    common = {"vertices": vertices, "frames": frames, "reference_error": exact.error}
-    if implicit is not None:
-        yardstick = Yardstick(scene, implicit)
-        common |= _own_errors(scene, implicit, section.implicit.tolerance / FINER)
+            log.warning("%s: no convergence in %d evaluations", scene.config.name, MOST)
+    truth = None if implicit is None else Yardstick(scene, implicit)
+    if truth is not None and test:
+        common |= _own_errors(truth, tolerance / FINER)
 
     def errors(run: np.ndarray | None) -> dict[str, float | None]:
         if run is None:
             return {}
-        position, shape = (None, None) if implicit is None else yardstick.errors(run, frames)
-        total = runfiles.run_error(run, exact.positions)
+        position, shape = (None, None) if truth is None else truth.errors(run, frames)
+        total = None if exact is None else runfiles.run_error(run, exact.positions)
         return {"error_implicit": position, "deformation_error": shape, "error_continuous": total}
 
-    yield {**common, "method": CONVERGED, "substeps": 1, "finite": True, **errors(implicit)}
-    yield {**common, "method": PLAYBACK, "substeps": 1, "finite": True, **errors(recorded)}
-    spans: dict[int, float | None] = {}
-    for candidate in candidates(scene, models, section):
-        with np.errstate(over="ignore", invalid="ignore"):
-            reached = candidate.run(frames, scene.mesh.extent)
-        row = {**common, **candidate.labels, "finite": reached is not None, **errors(reached)}
-        if implicit is not None and candidate.model is not None:
-            own = candidate.model.columns
-            if id(own) not in spans:
-                project = projector(own, scene.masses)
-                nearest = np.stack([own.B @ (project @ q) for q in implicit])
-                spans[id(own)] = runfiles.run_error(nearest, implicit)
-            row["span_error"] = spans[id(own)]
-        yield row
+    own = {"substeps": 1, "finite": True, "vertices": scene.mesh.vertices, **common}
+    coarse = [mesh.converged(tolerance, MOST) for mesh in case.coarser]
+    estimated = mesh_error(scene, implicit, case.coarser, coarse)
+    yield {**own, "method": CONVERGED, "mesh_error": estimated, **errors(implicit)}
+    for mesh, run in zip(case.coarser, coarse, strict=True):
+        yield {**own, "method": CONVERGED, "vertices": mesh.scene.mesh.vertices, **errors(run)}
+    yield {**own, "method": PLAYBACK, **errors(recorded)}
+    for setting in case.settings():
+        reached = setting.run(frames, scene.mesh.extent)
+        yield {**common, **setting.labels, "finite": reached is not None, **errors(reached)}
 
 
-def _own_errors(scene: Scene, run: np.ndarray, tolerance: float) -> dict[str, Any]:
-    """Errors of the converged ``run`` against a finer one, on sheets from other starting points."""
+def _own_errors(truth: Yardstick, tolerance: float) -> dict[str, float | None]:
+    """Errors of the converged run against a finer one, on sheets from other starting points."""
+    scene, frames = truth.scene, truth.scene.config.frames
     finer = converged_run(scene, tolerance, MOST, from_last=not len(scene.mesh.tetrahedra))
     if finer is None:
         log.warning("%s: no convergence to %g in %d steps", scene.config.name, tolerance, MOST)
         return {}
-    errors = Yardstick(scene, finer).errors(run, scene.config.frames)
+    errors = Yardstick(scene, finer).errors(truth.reference, frames)
     return dict(zip(("implicit_error", "implicit_deformation_error"), errors, strict=True))

@@ -58,6 +58,8 @@ RIGHT, GLOBAL, REST = "right-hand side", "global solve", "rest of the frame"
 Count = Annotated[int, Field(ge=1, le=100_000)]
 Repeats = Annotated[int, Field(ge=1, le=1000)]
 Modes = Annotated[int, Field(ge=1, le=1000)]
+Parts = tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...]
+PARTS = (1 / 2, 1 / 3, 1 / 4)  # of the cells along a side: coarser meshes of a scene
 Tolerance = Annotated[float, Field(gt=0.0, lt=1.0)]
 # Name of a scene -> factors by which the vertex count along each side of its mesh is multiplied.
 Sizes = dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]]

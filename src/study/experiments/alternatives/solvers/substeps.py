@@ -14,7 +14,6 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from pdrom.core.errors import SceneError
-from pdrom.core.registry import Registry
 from pdrom.model.compiled.functions import inner
 from pdrom.model.compiled.rows import WIDTH, as_vertices, flat, write
 from pdrom.model.constraints.local_kernel import table_of
@@ -24,16 +23,6 @@ from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
 from pdrom.model.dynamics.system import Elimination, GlobalSystem
 from pdrom.model.effects.forces import Gravity
 from pdrom.model.scene import Scene
-
-METHODS = Registry(
-    "method",
-    {
-        "projective": "study.experiments.alternatives.solvers.methods:SmallSteps",
-        "anderson": "study.experiments.alternatives.solvers.methods:Accelerated",
-        "chebyshev": "study.experiments.alternatives.solvers.methods:Chebyshev",
-        "explicit": "study.experiments.alternatives.solvers.methods:Explicit",
-    },
-)
 
 
 class Substeps(NamedTuple):
@@ -61,10 +50,9 @@ class Alternative(Stepper):
 
     A handle moves at constant speed during a frame, whatever the number of substeps. As in the
     ordinary step loop, contacts act at the end of a frame, and groups compute data for a frame at
-    its beginning. Loops with equal substeps may share a factorised ``system``. `METHODS` lists the
-    derived classes. Raises SceneError if the scene has a force other than gravity (which every
-    substep would have to evaluate if it depends on the motion), or a group without a compiled local
-    step.
+    its beginning. Loops with equal substeps may share a factorised ``system``. Raises SceneError if
+    the scene has a force other than gravity (which every substep would have to evaluate if it
+    depends on the motion), or a group without a compiled local step.
     """
 
     name: ClassVar[str]
