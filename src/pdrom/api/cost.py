@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from itertools import islice
 from time import perf_counter, process_time
 from typing import Any
 
@@ -18,7 +17,7 @@ from pdrom.api.model import BUSY, Model, OnFrame, load_model, silent
 from pdrom.api.training import EVALUATIONS, Progress, converged_positions
 from pdrom.core.errors import ConfigurationError, NotReducibleError, PdromError, SolverError
 from pdrom.core.yamlfile import shown
-from pdrom.model.coarser import Coarser, grids, mesh_error, on_mesh, spacing
+from pdrom.model.coarser import Coarser, error_of_mesh, grids, on_mesh
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene
@@ -109,7 +108,8 @@ def cost(
     best = settings.pareto(error.tolist(), table.ms.tolist())
     table = table.assign(best=np.array(best) & np.isfinite(error)).sort_values("ms")
     table.attrs = {
-        "frames": frames, "busy": busy, "mesh_error": _mesh_error(meshes, reference, progress),
+        "frames": frames, "busy": busy,
+        "mesh_error": _mesh_error(meshes, reference, progress),
     }  # fmt: skip
     return table.reset_index(drop=True)
 
@@ -141,8 +141,7 @@ def _full_order(scene: Scene, meshes: Sequence[Coarser]) -> Iterator[Setting]:
     config = scene.config
     counts = dict.fromkeys((*COUNTS, (config.iterations, config.anderson_window)))
     coarse = settings.full_order(scene, ON_COARSER, meshes)
-    fewer = islice(coarse, len(ON_COARSER), None)  # without those of the scene's own mesh
-    for setting in (*settings.full_order(scene, counts), *fewer):
+    for setting in (*settings.full_order(scene, counts), *coarse):
         labels, plain = setting.labels, (settings.PLAIN, settings.COARSER)
         words = f"{labels['iterations']} iteration{'s' * (labels['iterations'] > 1)}"
         words += ", Anderson" * (labels["method"] not in plain)
@@ -171,16 +170,13 @@ def _mesh_error(
     meshes: Sequence[Coarser], reference: np.ndarray, progress: Progress
 ) -> float | None:
     """Estimate the relative error of the scene's mesh by two of the coarser ``meshes``."""
-    if len(meshes) < 2:
-        return None
-    runs, spacings = [reference], [spacing(meshes[0].fine)]
-    for mesh in (meshes[0], meshes[-1]):
+    ends, runs = [meshes[0], meshes[-1]] if len(meshes) > 1 else [], []
+    for mesh in ends:
         found = converged_positions(mesh.scene, partial(_on, progress, mesh.scene.mesh.vertices))
         if found is None:
             return None
         runs.append(np.stack([mesh.positions(y) for y in found]))
-        spacings.append(spacing(mesh.scene.mesh))
-    return mesh_error(spacings, runs)
+    return error_of_mesh(reference, ends, runs)
 
 
 def _on(progress: Progress, vertices: int, name: str, frames: int) -> OnFrame:

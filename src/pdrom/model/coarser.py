@@ -129,34 +129,24 @@ def spacing(mesh: Mesh) -> float:
     return float(solid ** (-1 / 3) if solid else len(mesh.triangles) ** (-1 / 2))
 
 
-def mesh_error(
-    scene: Scene,
-    run: np.ndarray | None,
-    coarser: Sequence[Coarser],
-    runs: Sequence[np.ndarray | None],
-) -> float | None:
-    """Estimate the error of the scene's mesh, relative to the motion, by Richardson's rule.
+def mesh_error(spacings: Sequence[float], runs: Sequence[np.ndarray]) -> float | None:
+    """Estimate the error of the finest of three meshes, relative to the motion, by Richardson.
 
     With an error C h^p of a mesh of spacing h, the differences of three runs tell C and p.
 
     Parameters
     ----------
-    run : (F + 1, N, 3) m, converged, on the scene's mesh
-    coarser, runs : coarser meshes, and converged runs on them at the scene's vertices; the first
-        and the last are used
+    spacings : of three meshes, the finest first
+    runs : (F + 1, N, 3) m each, converged, at the vertices of the finest mesh
 
     Returns
     -------
     float or None
-        None if one of the runs is missing, nothing moves, or p is outside `ORDERS`.
+        None if the observed order p is outside `ORDERS`, or nothing moves.
     """
-    ends = [runs[i] for i in (0, -1)] if len(runs) > 1 else [None]
-    known = [own for own in (run, *ends) if own is not None]
-    if len(known) < 3:
-        return None
-    first, second, third = (spacing(s.mesh) for s in (scene, coarser[0].scene, coarser[-1].scene))
-    near, far = (float(np.linalg.norm(a - b)) for a, b in pairwise(known))
-    moved = float(np.linalg.norm(known[0] - known[0][0]))
+    first, second, third = spacings
+    near, far = (float(np.linalg.norm(a - b)) for a, b in pairwise(runs))
+    moved = float(np.linalg.norm(runs[0] - runs[0][0]))
 
     def excess(p: float) -> float:
         return (third**p - second**p) * near - (second**p - first**p) * far
@@ -166,3 +156,22 @@ def mesh_error(
         return None
     p = brentq(excess, *ORDERS)
     return near * first**p / (second**p - first**p) / moved
+
+
+def error_of_mesh(
+    run: np.ndarray | None, coarser: Sequence[Coarser], runs: Sequence[np.ndarray | None]
+) -> float | None:
+    """Estimate the relative error of the mesh of ``run``; None if unknown, see `mesh_error`.
+
+    Parameters
+    ----------
+    run : (F + 1, N, 3) m, converged, on the scene's mesh; None if it does not converge
+    coarser, runs : coarser meshes, and converged runs on them at the scene's vertices, of which the
+        first and the last are used
+    """
+    found = [run, *(runs[i] for i in (0, -1) if len(runs) > 1)]
+    known = [each for each in found if each is not None]
+    if len(known) < 3:
+        return None
+    meshes = [coarser[0].fine, coarser[0].scene.mesh, coarser[-1].scene.mesh]
+    return mesh_error([spacing(mesh) for mesh in meshes], known)

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.coarser import Coarser, grids, mesh_error
+from pdrom.model.coarser import Coarser, error_of_mesh, grids
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.settings import (
@@ -89,8 +89,8 @@ def iterations(
     runs = [mesh.converged(COARSE, MOST) for mesh in coarser]
     table = pd.DataFrame(rows, columns=COLUMNS)
     own = (table.iterations == config.iterations) & (table.window == 0)
-    table.loc[own & (table.vertices == scene.mesh.vertices), "mesh_error"] = mesh_error(
-        scene, limit, coarser, runs
+    table.loc[own & (table.vertices == scene.mesh.vertices), "mesh_error"] = error_of_mesh(
+        limit, coarser, runs
     )
     write_table(table, out.path)
 

@@ -19,7 +19,7 @@ from pydantic import Field
 
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.coarser import Coarser, grids, mesh_error
+from pdrom.model.coarser import Coarser, error_of_mesh, grids
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.held_out import MOTIONS, PLAYBACK
@@ -416,7 +416,7 @@ def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[dict[str, An
 
     own = {"substeps": 1, "finite": True, "vertices": scene.mesh.vertices, **common}
     coarse = [mesh.converged(tolerance, MOST) for mesh in case.coarser]
-    estimated = mesh_error(scene, implicit, case.coarser, coarse)
+    estimated = error_of_mesh(implicit, case.coarser, coarse)
     yield {**own, "method": CONVERGED, "mesh_error": estimated, **errors(implicit)}
     for mesh, run in zip(case.coarser, coarse, strict=True):
         yield {**own, "method": CONVERGED, "vertices": mesh.scene.mesh.vertices, **errors(run)}
