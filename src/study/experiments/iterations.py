@@ -86,6 +86,7 @@ def iterations(
             _, row["error_converged"], row["deformation_converged"] = setting.errors(truth)
         rows.append(row)
     coarser = grids(scene, asked.coarser)
+    coarser = coarser[:: max(1, len(coarser) - 1)]
     runs = [mesh.converged(COARSE, MOST) for mesh in coarser]
     table = pd.DataFrame(rows, columns=COLUMNS)
     own = (table.iterations == config.iterations) & (table.window == 0)

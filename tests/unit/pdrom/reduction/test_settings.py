@@ -29,7 +29,7 @@ def truth(scene) -> Yardstick:
 
 def test_every_mesh_has_every_count_with_its_labels(scene):
     meshes = coarser.grids(scene, (0.8, 0.6))
-    made = list(settings.full_order(scene, [(2, 0), (5, 3)], meshes))
+    made = list(settings.full_order(scene, [(2, 0), (5, 3)], [None, *meshes]))
     names = ["projective", "anderson", "coarser-mesh", "coarser-mesh-anderson", "coarser-mesh"]
     assert [each.labels["method"] for each in made] == [*names, names[3]]
     assert [each.labels["iterations"] for each in made] == [2, 5] * 3
