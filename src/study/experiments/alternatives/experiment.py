@@ -83,8 +83,8 @@ Method = Literal[
 # first run, and halved until the estimated error is below `CONTINUOUS_TOLERANCE`.
 EXPLICIT_STEPS, CONTINUOUS_TOLERANCE = 40, 1e-4
 # Frames of training runs converge to this part of the mesh; projections are evaluated up to `MOST`
-# times in a frame, also of the implicit reference, whose error a `FINER` times finer solve tells.
-TRAINING_TOLERANCE, MOST, FINER = 1e-5, 4000, 100.0
+# times in a frame, also of the implicit reference.
+TRAINING_TOLERANCE, MOST = 1e-5, 4000
 COARSE_TAU = 5e-3  # sampling tolerance of the coarse level of the two-level method
 VALIDATION = 1_000_000  # first seed of validation motions, far from those of training motions
 
@@ -96,9 +96,13 @@ class ContinuousReference(ConfigModel):
 
 
 class ImplicitReference(ConfigModel):
-    """Tolerance of the converged implicit step, over the longest side of the mesh."""
+    """Tolerance of the converged implicit step, over the longest side of the mesh.
+
+    Its error is told by a solve that is ``finer`` by this factor.
+    """
 
     tolerance: kit.Tolerance = 1e-7
+    finer: Annotated[float, Field(ge=2.0, le=1e6)] = 100.0
 
 
 class ReducedModel(ConfigModel):
@@ -405,7 +409,7 @@ def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[dict[str, An
             log.warning("%s: no convergence in %d evaluations", scene.config.name, MOST)
     truth = None if implicit is None else Yardstick(scene, implicit)
     if truth is not None and test:
-        common |= _own_errors(truth, tolerance / FINER)
+        common |= _own_errors(truth, tolerance / section.implicit.finer)
 
     def errors(run: np.ndarray | None) -> dict[str, float | None]:
         if run is None:
