@@ -11,7 +11,7 @@ from typing import NoReturn
 from snakemake_interface_logger_plugins.common import LogEvent
 
 from pdrom.core.errors import PdromError
-from study.pipeline.fork_server.client import GONE
+from study.pipeline.fork_server import GONE
 from study.pipeline.signals import KEPT, ending, handle
 
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (.*)$", re.MULTILINE)

@@ -60,8 +60,6 @@ def mesh_limits() -> MeshLimits:
     raise ConfigurationError(f"environment variable {VARIABLE} = '{text}': {required}")
 
 
-# Path of Python, stored at import, since the workflow changes `sys.executable` to a shell command.
-PYTHON = sys.executable
 # Modules of the process that reads a file, and the script that imports them from their texts.
 MODULES = ("raw", "surfaces", "grids", "reader")
 START = """
@@ -111,7 +109,7 @@ def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np
     numbers = (limits.seconds, limits.memory, limits.vertices, limits.cells)
     # -P: no module in the working folder shadows one; texts as this process imports them
     texts = {name: (get_data(__package__, f"{name}.py") or b"").decode() for name in MODULES}
-    command = [PYTHON, "-P", "-X", "utf8", "-W", "ignore", "-c", START, json.dumps(texts)]
+    command = [sys.executable, "-P", "-X", "utf8", "-W", "ignore", "-c", START, json.dumps(texts)]
     command += [str(path), *map(str, numbers)]
     # allow one thread per linear algebra library: more threads, unused here, would reserve memory
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

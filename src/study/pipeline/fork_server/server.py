@@ -7,7 +7,6 @@ import atexit
 import ctypes
 import gc
 import importlib
-import marshal
 import os
 import runpy
 import select
@@ -16,31 +15,25 @@ import socket
 import sys
 import threading
 from contextlib import suppress
-from typing import Any
 
 from study.artifact.planned import import_planned
-from study.pipeline.fork_server.client import forward, of_this_user
+from study.pipeline.fork_server import kill_group
 
-NUMBER = b"%20d"
 _DIES_WITH_PARENT = 1  # constant PR_SET_PDEATHSIG of <sys/prctl.h>
 
 
 class Server:
     """Server that forks a job for each request until its owner, the process of the run, ends.
 
-    A request is a message with file descriptors of the three standard streams and of a pipe. From
-    the pipe, the fork reads the folder, the script and the variables of the environment.
+    A request is the path of a script, with a socket on which the server answers: the process number
+    of the job, then its wait status.
 
-    listener : socket to which clients connect
-    owner : read end of a pipe whose write end only the owner has open
+    owner : socket from which the requests are read; its other end is open in the owner only
     """
 
-    def __init__(self, listener: socket.socket, owner: int) -> None:
-        self.listener = listener
+    def __init__(self, owner: socket.socket) -> None:
         self.owner = owner
-        # clients that have sent no request yet
-        self.silent: list[socket.socket] = []
-        # process number of a job -> client that waits for the job's end
+        # process number of a job -> socket on which its end is reported
         self.jobs: dict[int, socket.socket] = {}
         # the signal SIGCHLD at a job's end writes a byte into this pipe, which wakes the loop
         self.wake, self._waker = os.pipe()
@@ -53,64 +46,43 @@ class Server:
         signal.set_wakeup_fd(self._waker, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda number, frame: None)
         while True:
-            waiting: list[Any] = [self.listener, self.owner, self.wake]
-            ready = select.select([*waiting, *self.silent, *self.jobs.values()], [], [])[0]
-            if self.owner in ready:
-                for process in self.jobs:
-                    forward(process, signal.SIGKILL)
-                return None
+            ready = select.select([self.owner, self.wake], [], [])[0]
             if self.wake in ready:
                 os.read(self.wake, 4096)
-            # send the exit status of each ended job to its client, which may have ended as well
             for process in list(self.jobs):
                 done, status = os.waitpid(process, os.WNOHANG)
                 if done:
-                    with self.jobs.pop(process) as client, suppress(OSError):
-                        client.sendall(NUMBER % status)
-            for process, client in self.jobs.items():
-                # a client sends nothing after its request: a readable connection means it is gone
-                if client in ready:
-                    forward(process, signal.SIGKILL)
-            for client in [client for client in self.silent if client in ready]:
-                if script := self._answer(client):
-                    return script
-            if self.listener in ready:
-                client, _ = self.listener.accept()
-                if of_this_user(client):
-                    self.silent.append(client)
-                else:
-                    client.close()
+                    _answer(self.jobs.pop(process), status, last=True)
+            if self.owner in ready:
+                script, sockets, _, _ = socket.recv_fds(self.owner, 1 << 16, 1)
+                if not script:
+                    for process in self.jobs:
+                        kill_group(process)
+                    return None
+                if self._fork(socket.socket(fileno=sockets[0])):
+                    return os.fsdecode(script)
 
-    def _answer(self, client: socket.socket) -> str | None:
-        """Fork a job if the client's message is a request, else close the connection.
+    def _fork(self, client: socket.socket) -> bool:
+        """Fork a job that reports to ``client``; return True in the fork, False in the server.
 
-        Return the path of the script in the fork, None in the server. A client whose connection
-        was closed runs its script without the server.
+        Without a fork, the connection is closed without an answer.
         """
-        self.silent.remove(client)
-        streams: list[int] = []
-        process = None
-        with suppress(OSError):
-            streams = socket.recv_fds(client, 1, 4)[1]
-            process = os.fork() if len(streams) == 4 else None
-        if process == 0:
-            return self._become_job(client, streams)
-        for stream in streams:
-            os.close(stream)
-        if process is None:
+        try:
+            process = os.fork()
+        except OSError:
             client.close()
-            return None
+            return False
+        if process == 0:
+            self._become_job(client)
+            return True
         # server and fork both do this, so that the process group exists before either continues
         os.setpgid(process, process)
         self.jobs[process] = client
-        try:
-            client.sendall(NUMBER % process)
-        except OSError:
-            forward(process, signal.SIGKILL)
-        return None
+        _answer(client, process)
+        return False
 
-    def _become_job(self, client: socket.socket, streams: list[int]) -> str:
-        """Prepare this fork for its job, close the server's files; return the script's path."""
+    def _become_job(self, client: socket.socket) -> None:
+        """Prepare this fork for its job, and close the server's files."""
         os.setpgid(0, 0)
         # let the system kill this job when the server ends; exit if the server has ended already
         self._libc.prctl(_DIES_WITH_PARENT, signal.SIGKILL)
@@ -118,29 +90,23 @@ class Server:
             os._exit(1)
         signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-        for other in (self.listener, client, *self.silent, *self.jobs.values()):
+        for other in (self.owner, client, *self.jobs.values()):
             other.close()
-        for number, stream in enumerate(streams[:3]):
-            os.dup2(stream, number)
-        for descriptor in (self.owner, self.wake, self._waker, *streams[:3]):
-            os.close(descriptor)
-        try:
-            with open(streams[3], "rb") as request:
-                folder, script, environment = marshal.load(request)
-        except (EOFError, ValueError, TypeError):  # the client was killed while it wrote
-            os._exit(1)
-        os.chdir(folder)
-        os.environ.clear()
-        os.environ.update(environment)
-        sys.argv = [script]
-        sys.path[0] = os.path.dirname(script)
-        return script
+        os.close(self.wake)
+        os.close(self._waker)
+
+
+def _answer(client: socket.socket, number: int, last: bool = False) -> None:
+    """Send ``number`` to ``client``, whose owner may have ended; close it after the ``last``."""
+    with suppress(OSError):
+        client.send(str(number).encode())
+    if last:
+        client.close()
 
 
 def main() -> None:
     """Load the libraries and serve requests; in a fork, run the script of the job."""
-    listener = socket.socket(fileno=int(sys.argv[1]))
-    owner, libraries = int(sys.argv[2]), sys.argv[3:]
+    owner, libraries = socket.socket(fileno=int(sys.argv[1])), sys.argv[2:]
     import_planned()
     for library in libraries:
         importlib.import_module(library)
@@ -151,9 +117,10 @@ def main() -> None:
         target.target_context.refresh()
     gc.collect()
     gc.freeze()
-    script = Server(listener, owner).serve()
+    script = Server(owner).serve()
     if script is None:
         return
+    sys.argv, sys.path[0] = [script], os.path.dirname(script)
     # an exception ends the process as in a plain interpreter
     runpy.run_path(script, run_name="__main__")
     for thread in threading.enumerate():

@@ -8,20 +8,31 @@ import sys
 import pytest
 
 from study.artifact.planned import KEPT, plan
-from study.pipeline.fork_server import SUPPORTED, interpreter
+from study.pipeline.fork_server import SUPPORTED
 
 MODULE = "pdrom.core.errors"
-SERVER = "from study.pipeline.fork_server import start_server\nstart_server(['h5py'])\n"
-OWNER = "import subprocess\nfor _ in 'ab': subprocess.run({!r}, shell=True)"
-CHILD = f"{sys.executable} -m study.artifact.planned {MODULE}"
+FORKED = """
+from study.pipeline import fork_server
+from snakemake.script import PythonScript
+from types import SimpleNamespace
+fork_server.SUPPORTED = {}
+fork_server.start_server(["h5py"])
+for _ in "ab":
+    PythonScript.execute_script(SimpleNamespace(container_img=None), "job.py")
+"""
+CHILD = f"""
+import subprocess, sys
+for _ in "ab":
+    subprocess.run([sys.executable, "-m", "study.artifact.planned", "{MODULE}"])
+"""
 
 
 @pytest.mark.parametrize(
-    ("first", "job"),
-    [(SERVER * SUPPORTED, f"{interpreter()} job.py"), ("", f"{interpreter()} job.py"), ("", CHILD)],
+    "owner",
+    [FORKED.format(SUPPORTED), FORKED.format(False), CHILD],
     ids=["a fork", "without a server", "a process of a job"],
 )
-def test_a_job_imports_what_the_plan_has_read(first, job, tmp_path):
+def test_a_job_imports_what_the_plan_has_read(owner, tmp_path):
     """The file in ``src`` has another text all the time; the second job finds compiled code."""
     (tmp_path / "job.py").write_text(f"import {MODULE}")
     path, kept = plan()[0][MODULE][0], tmp_path / "plan.json"
@@ -29,7 +40,7 @@ def test_a_job_imports_what_the_plan_has_read(first, job, tmp_path):
         text = f"print('{word}', __file__)"
         kept.write_text(json.dumps([{**plan()[0], MODULE: (path, text)}, {}]))
         done = subprocess.run(
-            [sys.executable, "-c", first + OWNER.format(job)], cwd=tmp_path,
+            [sys.executable, "-c", owner], cwd=tmp_path,
             env={**os.environ, KEPT: str(kept)}, capture_output=True, text=True, check=True,
         )  # fmt: skip
         assert done.stdout == 2 * f"{word} {path}\n", done.stderr
