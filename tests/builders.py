@@ -109,6 +109,11 @@ def call_kernel(address, d, parameters, p, m):
     call_gradients(address, d.ctypes.data, parameters.ctypes.data, p.ctypes.data, m)
 
 
+def depths(contact, points: np.ndarray) -> np.ndarray:
+    """Depths (n,) m of ``points`` (n, 3) m below the surface of a floor or an obstacle."""
+    return contact.depths(points) if contact.height is None else contact.height - points[:, 1]
+
+
 def simplices(rows: int, count: int) -> Mesh:
     """``count`` separate unit simplices with ``rows`` + 1 vertices.
 

@@ -14,7 +14,6 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from pdrom.core.errors import SolverError
-from pdrom.core.registry import Registry
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
@@ -134,15 +133,6 @@ def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, v
             rows[start + k] *= WIDTH
 
 
-SOLVERS = Registry(
-    "solver",
-    {
-        "supernodal": "pdrom.model.dynamics.solvers:SupernodalSolver",
-        "splu": "pdrom.model.dynamics.solvers:SuperLUSolver",
-        "splu-columns": "pdrom.model.dynamics.solvers:ColumnOrderedSolver",
-    },
-)
-
 # A factor is a tuple of the first four arguments of `sweeps.sweep`: panels, vertices, loads, x.
 Factor = tuple[tuple[Any, ...], np.ndarray, np.ndarray, np.ndarray]
 NOTHING_FREE: Factor = (
@@ -165,7 +155,6 @@ class SuperLUSolver:
     coupling : (n, m) matrix entries between the unknowns and m held vertices; None if m = 0
     """
 
-    ordering = "MMD_AT_PLUS_A"
     factor: Factor | None = None
     """First arguments of `sweeps.sweep` in compiled loops; None if the solver is not compiled."""
     coupling = NO_COUPLING
@@ -179,7 +168,7 @@ class SuperLUSolver:
     ) -> None:
         self._vertices, self._held = vertices, coupling
         self._load = np.zeros((len(vertices), 3))
-        self._take(factored(matrix, self.ordering))
+        self._take(factored(matrix))
 
     def _take(self, factor: SuperLU) -> None:
         """Store the ``factor`` in the form that `solve` needs."""
@@ -193,12 +182,6 @@ class SuperLUSolver:
     def solve(self, rhs: np.ndarray, y: np.ndarray) -> None:
         """Overwrite the rows ``vertices`` of ``y`` (N, 3) by the solution for ``rhs`` (N, 3)."""
         y[self._vertices] = self._factor.solve(rhs[self._vertices] - self._load)
-
-
-class ColumnOrderedSolver(SuperLUSolver):
-    """SuperLU with the column ordering COLAMD, to measure how results depend on summation order."""
-
-    ordering = "COLAMD"
 
 
 class SupernodalSolver(SuperLUSolver):
@@ -234,17 +217,20 @@ class SupernodalSolver(SuperLUSolver):
             y[...] = rows.unflat(solution)
 
 
-def factored(matrix: sparse.csr_array, ordering: str) -> SuperLU:
-    """Factor ``matrix`` (n, n) by SuperLU without pivoting, with the column ordering ``ordering``.
+SOLVERS = {"supernodal": SupernodalSolver, "splu": SuperLUSolver}
+
+
+def factored(matrix: sparse.csr_array) -> SuperLU:
+    """Factor ``matrix`` (n, n) by SuperLU without pivoting.
 
     Raises SolverError if the matrix is singular or not positive definite.
     """
     size, options = matrix.shape[0], {"SymmetricMode": True}
     try:
-        factor = splu(matrix.tocsc(), ordering, diag_pivot_thresh=0.0, options=options)
+        factor = splu(matrix.tocsc(), "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     except RuntimeError as error:
         raise SolverError(f"global system of size {size}: {error}") from error
-    symmetric = ordering == "COLAMD" or np.array_equal(factor.perm_r, factor.perm_c)
+    symmetric = np.array_equal(factor.perm_r, factor.perm_c)
     if not (symmetric and (factor.U.diagonal() > 0.0).all()):
         raise SolverError(f"global system of size {size}: not positive definite")
     return factor

@@ -36,8 +36,7 @@ class Elimination:
         self.coupling = solvers.NO_COUPLING
         if len(self.free):
             block = matrix if not len(fixed) else matrix[self.free][:, self.free]
-            kind: type[solvers.SuperLUSolver] = solvers.SOLVERS.load(solver)
-            self._solver = kind(sparse.csr_array(block), self.free, coupling)
+            self._solver = solvers.SOLVERS[solver](sparse.csr_array(block), self.free, coupling)
             self.factor, self.coupling = self._solver.factor, self._solver.coupling
             require_accurate(block, self._solve_free)
 

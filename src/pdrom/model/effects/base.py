@@ -184,10 +184,6 @@ class Contact(Effect):
     height: float | None = None
     """Height y, m, for a floor: a contact that only moves lower vertices up to y; else None."""
 
-    def gaps(self, points: np.ndarray) -> np.ndarray:
-        """Return distances (n,) m of ``points`` (n, 3) m to obstacles, < 0 inside; inf if none."""
-        return np.full(len(points), np.inf)
-
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
         """Resolve the contact at all vertices except the ``held`` ones (n,); changes ``positions``.
 

@@ -38,9 +38,6 @@ class Obstacle(Contact):
         super().__init__(config, mesh, masses)
         self._slack = SLACK * mesh.extent
 
-    def gaps(self, points: np.ndarray) -> np.ndarray:
-        return -self.depths(points)
-
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
         outside = self.depths(before) <= self._slack
         hits, entries, normals = self.entries(before, positions)
@@ -280,9 +277,6 @@ class Floor(Contact):
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
         self.height = config.height
-
-    def gaps(self, points: np.ndarray) -> np.ndarray:
-        return points[:, 1] - self.config.height
 
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
         np.maximum(positions[:, 1], self.config.height, out=positions[:, 1])

@@ -15,6 +15,7 @@ import socket
 import sys
 import threading
 from contextlib import suppress
+from typing import Any
 
 from study.artifact.planned import import_planned
 from study.pipeline.fork_server import kill_group
@@ -45,8 +46,9 @@ class Server:
         """Fork a job per request; return None when the owner ends, in a fork its script's path."""
         signal.set_wakeup_fd(self._waker, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda number, frame: None)
+        watched: list[Any] = [self.owner, self.wake]
         while True:
-            ready = select.select([self.owner, self.wake], [], [])[0]
+            ready = select.select(watched, [], [])[0]
             if self.wake in ready:
                 os.read(self.wake, 4096)
             for process in list(self.jobs):

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from builders import SMALL
+from builders import SMALL, depths
 from mesh_files import write_mesh
 from pdrom import __version__
 from pdrom.api import load, load_scene
@@ -262,8 +262,9 @@ def test_a_new_scene_has_a_material_and_lengths_of_its_mesh_and_its_floor_is_bel
     assert scene.config.held_out.carry == 0.5 * mesh.extent
     assert up_of(scene.config.effects).tolist() == np.eye(3)[up].tolist()
     (floor,) = scene.contacts
-    assert floor.gaps(mesh.points).min() >= mesh.extent / 2.0
-    assert floor.gaps(mesh.points + np.eye(3)[up]) == pytest.approx(floor.gaps(mesh.points) + 1.0)
+    below = depths(floor, mesh.points)
+    assert below.max() <= -mesh.extent / 2.0
+    assert depths(floor, mesh.points + np.eye(3)[up]) == pytest.approx(below - 1.0)
 
 
 @pytest.mark.parametrize("suffix", READERS)

@@ -26,7 +26,7 @@ def test_solves_like_the_dense_matrix(name, n, seed):
     rng = np.random.default_rng(seed)
     root = sparse.random_array((n, n), density=min(1.0, 4.0 / n), rng=rng, format="csr")
     matrix = sparse.csr_array(root @ root.T + sparse.eye_array(n))
-    dense, solver = matrix.toarray(), SOLVERS.load(name)(matrix, np.arange(n))
+    dense, solver = matrix.toarray(), SOLVERS[name](matrix, np.arange(n))
     matrix.data[:] = np.nan
     for rhs in rng.standard_normal((2, n, 3)):
         before, out = rhs.copy(), np.full((n, 3), np.nan)
@@ -43,7 +43,7 @@ def test_a_singular_or_indefinite_matrix_has_one_error(name, pivot):
     matrix = sparse.csr_array(np.diag([1.0, pivot, 2.0]))
     message = "size 3: not positive definite" if pivot else "size 3"
     with pytest.raises(SolverError, match=message):
-        SOLVERS.load(name)(matrix, np.arange(3))
+        SOLVERS[name](matrix, np.arange(3))
 
 
 SCENE = make_scene({"effect": "spring", "weight": 1e4}, {"effect": "strain", "weight": 1e5})

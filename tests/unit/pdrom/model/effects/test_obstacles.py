@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from builders import OBSTACLES, make_scene
+from builders import OBSTACLES, depths, make_scene
 from pdrom.model.effects.base import effect_config
 from pdrom.model.runs import trajectory
 from strategies import SEEDS
@@ -143,9 +143,9 @@ def body(name):
 @pytest.mark.parametrize("name", BODIES)
 def test_corners_are_on_the_surface_that_keeps_vertices_out(name):
     (contact,) = make_scene(SPRING, {"effect": name, **BODIES[name]}).contacts
-    assert np.abs(contact.gaps(body(name).points)).max() < 1e-12
-    inside, outside = contact.gaps(np.array([[0.0, 0.0, 0.3], [0.0, 9.0, 0.0]]))
-    assert inside < 0.0 < outside
+    assert np.abs(depths(contact, body(name).points)).max() < 1e-12
+    inside, outside = depths(contact, np.array([[0.0, 0.0, 0.3], [0.0, 9.0, 0.0]]))
+    assert outside < 0.0 < inside
 
 
 @pytest.mark.parametrize("name", ["sphere", "box"])
