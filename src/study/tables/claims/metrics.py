@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from study.tables.accuracy_cost import CURVE
-from study.tables.kit.results import DEFORMATION, KEYS, MEDIAN, families, trained, with_held_out
+from study.tables.kit.results import MEDIAN, families, trained, with_held_out
 
 Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float
@@ -22,7 +22,6 @@ LABELS = (
 AXES = ("x", "y", "z")
 _ERROR = "relative_error_within_horizon"
 _RUN = ["scene", "group", "method"]
-_RERUN = ("motion", "frames", "blowup_frame", _ERROR, DEFORMATION, *_RUN, "position_basis", "r")
 
 
 def filtered(table: pd.DataFrame, where: Where) -> pd.DataFrame:
@@ -183,20 +182,21 @@ def over_the_rest(share: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Metric:
-    """Metric that a test of a claim compares with a threshold, from columns of one table.
+    """Metric that a test of a claim compares with a threshold, computed from one table.
 
     of : function of the selected rows and ``accuracy`` (largest error of an accurate run); returns
         values of some of these rows, or a table with columns `VALUE`, scene, group ...
     choose : function of the table and ``where`` (column -> allowed values) that selects the rows
     labels : columns that ``where`` may name although the table lacks them: ``choose`` adds them
-    ratio : function that converts a value to a ratio of two times, for metrics based on times
+    timed : whether values are computed from measured times
+    ratio : function that converts a value to a ratio of two times, for timed metrics
     """
 
     of: Values
     table: str
-    columns: tuple[str, ...]
     choose: Callable[[pd.DataFrame, Where], pd.DataFrame] = filtered
     labels: tuple[str, ...] = ()
+    timed: bool = False
     ratio: Callable[[np.ndarray], np.ndarray] = np.asarray
 
     def values(self, tables: Tables, where: Where, accuracy: float) -> pd.DataFrame:
@@ -209,57 +209,36 @@ class Metric:
         return rows.loc[found.index, labels].assign(**{VALUE: found})
 
 
-def _of_reruns(of: Values, *more: str) -> Metric:
-    return Metric(of, "reduced_reruns", (*_RERUN, *more), reruns)
-
-
-_RECONSTRUCTION = "reconstruction_error"
+_RERUNS, _RECONSTRUCTION = "reduced_reruns", "reconstruction_error"
 METRICS = {
     # share of the local step in the time of a frame
     "local_share": Metric(
-        lambda rows, _: rows.local_share, "local_share", ("local_share",), ratio=over_the_rest
+        lambda rows, _: rows.local_share, "local_share", timed=True, ratio=over_the_rest
     ),
     # error over frames in which perturbed full-order runs agree; inf if the run blew up in them
-    "rerun_error": _of_reruns(lambda rows, _: rows[_ERROR].fillna(np.inf)),
-    "useful_speedup": _of_reruns(useful_speedup, "speedup"),
-    "best_useful_speedup": _of_reruns(best_useful_speedup, "speedup"),
-    "error_trend": _of_reruns(error_trend),
-    "trend_p_value": _of_reruns(partial(trend_p_value, _ERROR)),
-    "repeated_trend_p_value": Metric(
-        partial(trend_p_value, "error_median"),
-        "repetitions",
-        (*_RUN, "r", "varied", "error_median"),
-    ),
-    "singular_value_decay": Metric(
-        decay, "singular_values", ("scene", "group", "above_roundoff", "relative")
-    ),
-    "reconstruction_error": Metric(reconstruction, _RECONSTRUCTION, ("gain", "relative_error")),
+    "rerun_error": Metric(lambda rows, _: rows[_ERROR].fillna(np.inf), _RERUNS, reruns),
+    "useful_speedup": Metric(useful_speedup, _RERUNS, reruns, timed=True),
+    "best_useful_speedup": Metric(best_useful_speedup, _RERUNS, reruns, timed=True),
+    "error_trend": Metric(error_trend, _RERUNS, reruns),
+    "trend_p_value": Metric(partial(trend_p_value, _ERROR), _RERUNS, reruns),
+    "repeated_trend_p_value": Metric(partial(trend_p_value, "error_median"), "repetitions"),
+    "singular_value_decay": Metric(decay, "singular_values"),
+    "reconstruction_error": Metric(reconstruction, _RECONSTRUCTION),
     "axis_reconstruction_error": Metric(
-        axis_reconstruction,
-        _RECONSTRUCTION,
-        (*_RUN, "split", "gain", *(f"relative_error_{axis}" for axis in AXES)),
-        by_axis,
-        labels=("axis",),
+        axis_reconstruction, _RECONSTRUCTION, by_axis, labels=("axis",)
     ),
-    "noise_error": Metric(noise_error, "noise", ("r", "rank", "relative_error")),
-    "elements_per_entry": Metric(elements_per_entry, _RECONSTRUCTION, ("elements_sampled", "r")),
+    "noise_error": Metric(noise_error, "noise"),
+    "elements_per_entry": Metric(elements_per_entry, _RECONSTRUCTION),
     **{
-        f"{part}_time_ratio": Metric(partial(local_ratio, name), "breakeven", (*CURVE, "r", name))
+        f"{part}_time_ratio": Metric(partial(local_ratio, name), "breakeven", timed=True)
         for part, name in (("local", "ratio"), ("solve", "solve_ratio"), ("lift", "lift_ratio"))
     },
     "position_basis_ratio": Metric(
-        position_basis_ratio,
-        "reduced_reruns",
-        ("motion", "scene", "k", "position_basis", _ERROR, DEFORMATION),
-        lambda table, where: filtered(trained(table), where),
+        position_basis_ratio, _RERUNS, lambda table, where: filtered(trained(table), where)
     ),
 }
 METRICS |= {
-    f"heldout_{name}": replace(
-        metric,
-        choose=partial(held_out, metric.choose),
-        columns=(*metric.columns, *_RERUN, "horizon_frame", "playback_error", *KEYS),
-    )
+    f"heldout_{name}": replace(metric, choose=partial(held_out, metric.choose))
     for name, metric in METRICS.items()
-    if metric.table == "reduced_reruns" and name != "trend_p_value"
+    if metric.table == _RERUNS and name != "trend_p_value"
 }

@@ -63,7 +63,7 @@ class TestRule(ConfigModel):
         """Whether the compared values or the selection of rows depend on measured times."""
         metric = METRICS[self.metric]
         timing = declared()[metric.table].timing_columns
-        return not set(timing).isdisjoint({*metric.columns, *self.where})
+        return metric.timed or not set(timing).isdisjoint(self.where)
 
     @property
     def factor(self) -> float:
