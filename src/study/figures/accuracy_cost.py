@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.model.held_out import FIRST, PLAYBACK
-from pdrom.reduction.settings import pareto
+from pdrom.reduction.settings import COARSER, pareto
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure, Line2D
 from study.artifact.reads import TableOf
@@ -21,7 +21,7 @@ ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
 LOW, HIGH = 1e-3, 1e2  # limits of the error axis; errors outside are arrows at the limits
 ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers: error above axis, below it, blow-up
 OWN = {"color": style.GREY, "linewidth": 1.2}
-RATES = (60, 30)  # frame rates of real time, 1/s, drawn as lines
+MESH_ERROR = {"color": style.GREY, "linestyle": "-.", "linewidth": 1.0, "zorder": 0}
 LARGE, SMALL = 2.6, 1.6  # heights of the large and of the small panels, inches
 LINE, GAP = 0.145, 0.06  # height of a legend line, gap between rows of legend blocks, inches
 NEAR = 0.05  # markers closer in x than this fraction of the x axis share a label
@@ -29,13 +29,14 @@ COLUMNS = 4  # number of legend blocks in a row
 # Families of reduced models and of full-order runs, each with its colour.
 FAMILIES = {
     "full order, K iterations": style.BLACK,
+    "full order, coarser meshes": style.ORANGE,
     "orthogonal projection": style.PURPLE,
     "single entries, joint rows": style.VERMILLION,
     "whole elements": style.BLUE,
     "subspace, weighted or full": style.GREEN,
-    "subspace, interpolated": style.ORANGE,
+    "subspace, interpolated": style.SKY,
 }
-ITERATIONS, PROJECTION, ENTRIES, ELEMENTS, WEIGHTED, INTERPOLATED = FAMILIES
+ITERATIONS, COARSE, PROJECTION, ENTRIES, ELEMENTS, WEIGHTED, INTERPOLATED = FAMILIES
 _BY_ROWS = {"all": PROJECTION, "scalar": ENTRIES, "joint": ENTRIES, "element": ELEMENTS}
 Look = tuple[str | None, str]
 Block = tuple[str, list[Line2D]]
@@ -45,6 +46,8 @@ def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
     """Family of a model (see `FAMILIES`; None if it is not drawn), and its legend entry."""
     if method == FOM:
         return ITERATIONS, "K iterations"
+    if method.startswith(COARSER):
+        return COARSE, "plain and accelerated"
     if position_basis == "full":
         held = drawn.reductions.get(method)
         return _BY_ROWS[held.rows] if held else None, drawn.title(method)
@@ -71,12 +74,14 @@ class TradeOffs:
     points : rows of table accuracy_cost; errors are against the converged run
     blown_up : reduced runs that blew up before an error could be computed
     own_ms : scene -> time per frame of its own full-order run, ms
+    mesh_error : scene -> error of its mesh relative to the motion, NaN where it is not known
     marker : (name in `FAMILIES`, legend entry) -> Matplotlib marker
     """
 
     points: pd.DataFrame
     blown_up: pd.DataFrame
     own_ms: dict[str, float]
+    mesh_error: dict[str, float]
     marker: dict[Look, str]
 
     def members(self, family: str) -> dict[str, str]:
@@ -100,8 +105,8 @@ def trade_offs(
     scenes = drawn.scenes_of(points, "no reduced model with both an error and a time")
     points = points[points.scene.isin(scenes)]
     marker = markers(list(zip(points.family, points.member, strict=True)))
-    found = TradeOffs(points, _drawn(blown_up, drawn), dict(full[TIME]), marker)
-    return found, scenes
+    own_run = dict(full[TIME]), dict(full.mesh_error)
+    return TradeOffs(points, _drawn(blown_up, drawn), *own_run, marker), scenes
 
 
 def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
@@ -140,6 +145,7 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
     time_axis(ax, np.asarray(times, dtype=float))
     if scene in found.own_ms:
         ax.axvline(found.own_ms[scene], zorder=0, **OWN)
+        ax.axhline(found.mesh_error[scene], **MESH_ERROR)
 
 
 def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any) -> None:
@@ -173,6 +179,7 @@ def handles(found: TradeOffs) -> list[Block]:
     common = {"linewidth": 1.0, "markersize": 4.0}
     entries = [("full order", style.handles({"K iterations": (style.BLACK, "X")}, **common))]
     entries[0][1].append(style.handle("time with the scene's K", **OWN))
+    entries[0][1].append(style.handle("error of the mesh itself", **MESH_ERROR))
     for family, colour in FAMILIES.items():
         looks = {name: (colour, marker) for name, marker in found.members(family).items()}
         if looks and family != ITERATIONS:
@@ -190,12 +197,13 @@ def handles(found: TradeOffs) -> list[Block]:
 )
 def accuracy_cost(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> Figure:
     """Position error within the horizon, against the converged run, and time per frame of every
-    reduced model and of the full-order run with $K$ iterations. The vertical line is the time of
-    the scene's own number of iterations. A colour is a family of models, a marker one of its
-    members (one for all tolerances; hollow: in a subspace of skinning weights), a line the best
-    trade-offs within the family: further down and further left is better. Arrows on the rim are
-    errors outside the axis, crosses runs that blew up. Below, a scene for each other constraint
-    group.
+    reduced model and of the full-order run with $K$ iterations, also on coarser meshes, whose
+    displacement is interpolated to all vertices. The vertical line is the time of the scene's own
+    number of iterations, the horizontal one the error of the mesh itself (Richardson's rule): a
+    smaller error buys no accuracy. A colour is a family of models, a marker one of its members (one
+    for all tolerances; hollow: in a subspace of skinning weights), a line the best trade-offs
+    within the family: further down and further left is better. Arrows on the rim are errors outside
+    the axis, crosses runs that blew up. Below, a scene for each other constraint group.
     """
     found, (first, *rest) = trade_offs(drawn, table, runs)
     groups = {}  # scene -> text that names its reduced groups
@@ -212,7 +220,6 @@ def accuracy_cost(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> Figu
     ax = parts[0].subplots()
     draw_panel(ax, found, first, size=4.2)
     label_iterations(ax, found, first)
-    _draw_rates(ax)
     ax.set_title(f"{groups[first]}: {style.words(first)}")
     ax.set(xlabel="time per frame (ms)", ylabel="position error")
     if small:
@@ -233,32 +240,15 @@ def accuracy_cost(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> Figu
     return figure
 
 
-def _draw_rates(ax: Axes) -> None:
-    """Draw vertical lines at the times per frame of `RATES`, arrows to those beyond the axis."""
-    high = ax.get_xlim()[1]
-    beyond = [rate for rate in RATES if 1e3 / rate >= high]
-    for rate in set(RATES) - set(beyond):
-        ax.axvline(1e3 / rate, color="#8A857A", linewidth=0.8, linestyle="--", zorder=0)
-        _label(ax, 1e3 / rate, f"{rate} fps ")
-    if beyond:
-        names = ", ".join(str(rate) for rate in beyond)
-        _label(ax, high, f"{names} fps \N{RIGHTWARDS ARROW}")
-
-
-def _label(ax: Axes, x: float, text: str) -> None:
-    look = {"fontsize": 6.5, "va": "top", "ha": "right", "color": "#6B675F"}
-    ax.text(x, 0.99, text, transform=ax.get_xaxis_transform(), **look)
-
-
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits
 BESIDE = 4  # largest number of panels in a row
-BEST, DOT = ("full order, the best of all methods", style.BLACK), (0.55, 0.55, 0.55)
+BEST, DOT = {"full order, same mesh": style.BLACK, COARSE: FAMILIES[COARSE]}, (0.55, 0.55, 0.55)
 # Legend label -> (condition on the number of training motions of a reduction, colour).
 TRAINED = {
-    "reduction, one training motion": ("training_motions == 1", style.GREEN),
-    "reduction, several training motions": ("training_motions > 1", style.BLUE),
+    "reduced, one training trajectory": ("training_motions == 1", style.GREEN),
+    "reduced, several trajectories": ("training_motions > 1", style.BLUE),
 }
-BARE = "the same without the vertices"
+BARE = "reduced, without the vertices"
 
 
 @figure(
@@ -266,48 +256,54 @@ BARE = "the same without the vertices"
     timed=True,
 )  # fmt: skip
 def alternatives(table: pd.DataFrame) -> Figure:
-    r"""Position error of whole trajectories against the implicit step solved to convergence, over
-    the time per frame with the positions of all vertices, on the first held-out motion. A time of 1
-    is that of plain projective dynamics with ten iterations on the same machine. Black: the best
-    points of all full-order methods, whose settings are the grey dots. Colours: the best points of
-    the reduction (ecsw) trained on frames of one motion or of several; dotted: without the time of
-    the vertices. Dashed: playback of the training recording, which takes no time. $\times 100$: the
-    same scene with stiffer weights; *: recorded by the extended study. Errors outside
-    are drawn on the rim.
+    r"""Position error over all frames against the converged step of the same mesh, and time per
+    frame with the positions of all vertices, on the first test trajectory. A time of 1 is that of
+    plain projective dynamics with ten iterations. Black: the best settings of the full-order model,
+    whose other settings are the grey dots; orange: on coarser meshes, whose displacement is
+    interpolated to all vertices. Green and blue: the reduced model (ecsw), trained on one or on
+    several trajectories; dotted: without the time of the vertices. Dashed: the training trajectory,
+    replayed. Dash-dotted: the error of the mesh itself, by Richardson's rule on three meshes (drawn
+    if the observed order is 0.5 to 3); a smaller error buys no accuracy. $\times 100$: stiffer
+    weights; *: recorded by the extended study. Errors outside are drawn on the rim.
     """
     table = table[table.motion == FIRST]
-    cases = table.groupby(["scene", "vertices", "stiffness"])
+    cases = table.groupby(["scene", "factor", "stiffness"])
     cases = [(labels, case) for labels, case in cases if case.time_ratio.notna().any()]
     if not cases:
         raise NothingToDraw("no alternatives")
     beside = -(-len(cases) // rows_of(len(cases), BESIDE))
-    figure, axes = small_multiples(len(cases), beside, legend_rows=2, height=1.9)
+    figure, axes = small_multiples(len(cases), beside, legend_rows=3, height=1.9)
     for (labels, case), ax in zip(cases, axes, strict=True):
         _draw_case(ax, labels, case)
     label_outer(axes, beside, "time / plain frame", y="position error")
-    drawn = {label: (colour, "o") for label, (_, colour) in TRAINED.items()}
+    drawn = BEST | {label: colour for label, (_, colour) in TRAINED.items()}
     lines = [style.handle(BARE, color=style.GREEN, linestyle=":")]
-    lines.append(style.handle("playback", color="#555555", linestyle="--"))
-    style.legend(figure, [*style.handles({BEST[0]: (BEST[1], "o")} | drawn), *lines], 3)
+    lines.append(style.handle("training trajectory replayed", color="#555555", linestyle="--"))
+    lines.append(style.handle("error of the mesh itself", **MESH_ERROR))
+    looks = {label: (colour, "o") for label, colour in drawn.items()}
+    style.legend(figure, [*style.handles(looks), *lines], 3)
     return figure
 
 
-def _draw_case(ax: Axes, labels: tuple[str, int, float], case: pd.DataFrame) -> None:
-    scene, vertices, stiffness = labels
+def _draw_case(ax: Axes, labels: tuple[str, float, float], case: pd.DataFrame) -> None:
+    (scene, _, stiffness), vertices = labels, case.vertices.max()
     stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
     mark = "*" if case.recorded.notna().any() else ""
-    ax.set_title(f"{style.words(scene)}{stiff}, {vertices:,} vertices{mark}", fontsize=7.0)
+    ax.set_title(f"{style.words(scene)}{stiff}, {vertices:,.0f} vertices{mark}", fontsize=7.0)
     style.log_axis(ax, LEAST, MOST)
     time_axis(ax, case.time_ratio.to_numpy(float))
     rows = case.rename(columns={"error_implicit": "error"}).dropna(subset="error")
     for error in rows.error[rows.method == PLAYBACK]:
         ax.axhline(error, color="#555555", linestyle="--", linewidth=0.8)
+    for error in rows.mesh_error.dropna():
+        ax.axhline(error, **MESH_ERROR)
     rows = rows[rows.time_ratio.notna()]
-    inside = rows.method.isin(REDUCTIONS)
-    full = rows[~inside]
+    inside, coarse = rows.method.isin(REDUCTIONS), rows.method.str.startswith(COARSER)
+    full = rows[~inside & ~coarse]
     errors = np.clip(full.error.to_numpy(float), LEAST, MOST)
     ax.plot(full.time_ratio, errors, ".", color=DOT, markersize=3.0)
-    _draw_best(ax, full, BEST[1], "-")
+    for best, colour in zip((full, rows[coarse]), BEST.values(), strict=True):
+        _draw_best(ax, best, colour, "-")
     for trained, colour in TRAINED.values():
         own = rows[inside].query(trained)
         _draw_best(ax, own, colour, "-")

@@ -280,13 +280,51 @@ def test_full_order_runs_with_any_number_of_iterations_are_the_crosses_of_one_cu
     names = "scene method position_basis iterations relative_error_within_horizon ms_per_frame"
     points = [("full", 10, 0.01, 4.0), ("deim", 10, 0.5, 2.0), ("fom-anderson", 10, 0.005, 4.5)]
     points += [("fom", k, 1.0 / k, 0.4 * k) for k in (2, 10, 40)]
+    points += [("coarser-mesh", 2, 0.04, 0.1), ("coarser-mesh-anderson", 5, 0.03, 0.3)]
     table = frame(names, *(("strain_oop", method, "full", *rest) for method, *rest in points))
+    table["mesh_error"] = np.where(table.method == "full", 0.02, np.nan)
     figure = study.draw("accuracy_cost", {"table": table}, scenes=("strain_oop",))
     (ax,) = figure.axes
     assert any(list(line.get_xdata()) == [4.0, 4.0] for line in ax.lines)
     assert 4.5 not in {float(x) for line in ax.lines for x in line.get_xdata()}
     runs, _ = [line for line in ax.lines if line.get_marker() == "X"]
     assert list(runs.get_xdata()) == pytest.approx([0.8, 4.0, 16.0])
+    *_, front, _ = [line for line in ax.lines if line.get_color() == view.FAMILIES[view.COARSE]]
+    assert front.get_xydata().tolist() == [[0.1, 0.04], [0.3, 0.03]]
+    assert any(list(line.get_ydata()) == [0.02, 0.02] for line in ax.lines)
+
+
+def test_coarser_meshes_have_a_curve_and_the_own_mesh_an_error():
+    """Validation trajectories are not drawn."""
+    names = "method vertices mesh_error motion error_implicit time_ratio"
+    own = [("converged", 400, 0.05, "heldout", 0, None), ("anderson", 400, None, "heldout", 0.2, 1)]
+    other = [("coarser-mesh", 9, None, *rest) for rest in (("heldout", 0.3, 0.1), ("v", 0.1, 0.1))]
+    table = frame(names, *own, *other).assign(scene="a", factor=1)
+    table = table.assign(stiffness=1.0, training_motions=None, vertices_ratio=0.0, recorded=None)
+    (ax,) = declarations()["alternatives"].draw(table=table).axes
+    assert ax.get_title() == "a, 400 vertices"
+    curves = {line.get_color(): line.get_xydata().tolist() for line in ax.lines}
+    assert [curves[colour] for colour in view.BEST.values()] == [[[1.0, 0.2]], [[0.1, 0.3]]]
+    assert curves[view.MESH_ERROR["color"]] == [[0.0, 0.05], [1.0, 0.05]]
+
+
+def test_a_speedup_that_is_doubtful_has_another_mark():
+    """Hollow: a large error, or a lower bound (arrow); a cross without a number: not judged."""
+    names = "vertices motion position_error known same_reached"
+    rows = [(8000, "heldout", 0.0035, True, True), (400, "heldout", 9.0, False, True)]
+    rows += [(400, "kick", 0.2, True, True), (400, "stiffness", 0.011, True, False)]
+    table = frame(names, *rows).assign(elements="springs", scene="a", factor=1, stiffness=1.0)
+    table = table.assign(method="ecsw", training_motions=2, iterations=5, coarser_reached=True)
+    of = [f"{name}_speedup" for name in ("same", "coarser")]
+    table[[*of, *(f"{name}_{end}" for name in of for end in ("low", "high"))]] = 4.0
+    same, coarser = declarations()["equal_error"].draw(table=table.assign(recorded=None)).axes
+    marks = [line for line in same.lines if len(line.get_xdata()) == 1]
+    marks = sorted((line.get_xdata()[0], line.get_marker(), line.get_mfc()) for line in marks)
+    assert [marker for _, marker, _ in marks] == ["x", "o", "o", "o"]
+    assert [face == "white" for *_, face in marks] == [False, True, True, False]
+    assert sorted(text.get_text() for text in same.texts) == ["0.35", "1.1", "20", "\u2191"]
+    assert len(coarser.texts) == 3
+    assert [t.get_text() for t in same.get_xticklabels()] == ["a, 400", "a, 8,000"]
 
 
 def test_what_an_effect_moves_stands_beside_the_floor(study):
@@ -338,7 +376,8 @@ def invented(errors, times, method="deim", blown_up=(), position_basis="full"):
     points["iterations"] = points.index + 1
     lost = pd.DataFrame({view.ERROR: np.nan, view.TIME: blown_up})
     marker = {(view.ENTRIES, "deim"): "o"}
-    return view.TradeOffs(points.assign(**names), lost.assign(**names), {"a": 2.0}, marker)
+    own = {"a": 2.0}, {"a": 0.1}
+    return view.TradeOffs(points.assign(**names), lost.assign(**names), *own, marker)
 
 
 def drawn(ax, marker):
