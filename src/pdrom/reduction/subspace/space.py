@@ -277,6 +277,11 @@ class _ReducedContact:
         if np.array_equal(probed, corrected):
             return
         # fixed y do not change: only held vertices depend on them, and contacts do not move these
+        if self.height is not None:  # a floor lifts the vertices below it, and leaves all others
+            heights = self._columns.B @ y[:, 1]
+            low = np.setdiff1d(np.flatnonzero(heights < self.height), held)
+            y[:, 1] += self._project[:, low] @ (self.height - heights[low])
+            return
         full = self._columns.B @ y
         self._contact.apply(full, self._columns.B @ before, held)
         y[...] = self._project @ full
