@@ -124,16 +124,13 @@ def _coarser(scene: Scene, given: Any) -> Coarser:
     """Return ``scene`` on the mesh ``given``, or in this file, read as the scene's own file is."""
     if isinstance(given, Mesh):
         return on_mesh(scene, given)
-    path = files.file_path(given)
+    path, own = files.file_path(given), scene.config.mesh
+    like = own if isinstance(own, MeshFile) else MeshFile(kind="file", path="any")
+    config = like.model_copy(update={"path": path.name})
     try:
-        own, found = scene.config.mesh, path.resolve()
-        like = own if isinstance(own, MeshFile) else MeshFile(kind="file", path="any")
-        config = like.model_copy(update={"path": found.name})
-        return on_mesh(scene, config.build(found.parent))
-    except (OSError, RuntimeError) as error:
-        raise ConfigurationError(f"{path}: leads nowhere") from error
+        return on_mesh(scene, config.build(path.parent))
     except PdromError as error:
-        fault = str(error).removeprefix(f"{path.name}: ")
+        fault = str(error).removeprefix(f"{path}: ").removeprefix(f"{path.name}: ")
         raise ConfigurationError(f"{path}: {fault}") from error
 
 
@@ -161,7 +158,7 @@ def _of_model(scene: Scene, given: Any, number: int) -> Iterator[Setting]:
         yield Setting(labels, *loop)
         return
     yield settings.reduced(labels, scene, model.reduced, ITERATIONS)
-    labels |= {"setting": f"model {name}, converged", "iterations": None}
+    labels = labels | {"setting": f"model {name}, converged", "iterations": None}
     with suppress(NotReducibleError):  # Newton's method needs derivatives of every group
         yield settings.reduced(labels, scene, model.reduced, None)
 

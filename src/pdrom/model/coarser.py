@@ -22,6 +22,7 @@ from pdrom.model.runs import converged_run
 from pdrom.model.scene import Scene
 
 ORDERS = (0.5, 3.0)  # observed orders of convergence for which `mesh_error` tells an error
+CELLS = "triangles", "tetrahedra"
 APART = 0.25  # part of the longest side by which the boxes of two meshes of a body may differ
 
 
@@ -70,12 +71,10 @@ def on_mesh(scene: Scene, mesh: Mesh) -> Coarser:
         vertex of the scene is near to; an effect does not suit it.
     """
     name, own = scene.config.name, scene.mesh
-    kinds = [bool(len(each.tetrahedra)) for each in (own, mesh)]
-    if mesh.vertices >= own.vertices or kinds[0] != kinds[1]:
-        what = "tetrahedra" if kinds[1] else "triangles"
+    has = [f"{m.vertices} vertices and {CELLS[len(m.tetrahedra) > 0]}" for m in (own, mesh)]
+    if mesh.vertices >= own.vertices or has[0].split()[-1] != has[1].split()[-1]:
         raise SceneError(
-            f"scene '{name}': a mesh of {mesh.vertices} vertices and {what} is no coarser mesh of "
-            f"{own.vertices} vertices and {'tetrahedra' if kinds[0] else 'triangles'}"
+            f"scene '{name}': a coarser mesh has fewer than {has[0]}, this one has {has[1]}"
         )
     check_mesh(mesh, f"scene '{name}': coarser mesh")
     ends = [np.array([m.points.min(axis=0), m.points.max(axis=0)]) for m in (mesh, own)]
