@@ -80,11 +80,11 @@ def moved(mesh: Mesh, factor: float = 1.0, shift: float = 0.0) -> Mesh:
 @pytest.mark.parametrize(
     ("mesh", "fault"),
     [
-        (bar(9, 5, 4), "fewer than 180 vertices and tetrahedra, this one has 180 vertices"),
-        (cloth(5, 5), "fewer than 180 vertices and tetrahedra, this one has 25 vertices and tri"),
-        (moved(bar(5, 3, 3), 1e-3), "must fill the same space, with the same unit of length"),
-        (moved(bar(5, 3, 3), shift=9.0), "must fill the same space"),
-        (bar(41, 2, 2), "no vertex is near vertex"),
+        (bar(9, 5, 4), "has 180 vertices and tetrahedra, not fewer than 180 vertices"),
+        (cloth(5, 5), "has 25 vertices and triangles, not fewer than 180 vertices and tetrahedra"),
+        (moved(bar(5, 3, 3), 1e-3), "ends 2.*m from the scene's: in another unit of length"),
+        (moved(bar(5, 3, 3), shift=9.0), "ends 9.*m from the scene's"),
+        (bar(41, 2, 2), "no vertex of the scene's mesh is near its vertex"),
     ],
     ids=["as fine", "surface", "millimetres", "elsewhere", "finer along x"],
 )
@@ -97,7 +97,7 @@ def test_a_mesh_that_is_no_coarser_one_is_refused(mesh, fault):
 def test_a_faulty_mesh_is_refused_as_one():
     made = bar(5, 3, 3)
     flat = replace(made, tetrahedra=np.vstack([made.tetrahedra, [[0, 1, 2, 2]]]))
-    with pytest.raises(MeshError, match="scene 'test': coarser mesh: "):
+    with pytest.raises(MeshError, match="scene 'test': the coarser mesh: "):
         coarser.on_mesh(solid(), flat)
 
 
