@@ -23,7 +23,7 @@ from pdrom.model.scene import Scene
 from pdrom.reduction import settings
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.settings import Setting
-from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.model import SubspaceModel, reduced
 
 log = logging.getLogger(__name__)
 # Iterations of a frame and window of Anderson acceleration (0: none), on coarser meshes fewer.
@@ -142,6 +142,6 @@ def _of_model(scene: Scene, given: Any, number: int) -> Iterator[Setting]:
         loop = model.loop(scene.iterated(ITERATIONS), solver="local_global")
         if isinstance(model.reduced, SubspaceModel):
             with suppress(NotReducibleError):  # Newton's method needs derivatives of every group
-                yield settings.reduced(labels, scene, model.reduced, count)
+                yield reduced(labels, scene, model.reduced, count)
         elif count:
             yield Setting(labels, *loop)

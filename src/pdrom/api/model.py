@@ -161,7 +161,7 @@ class Model:
         require_same_mesh(self.scene, scene)
         asked = validate(_Asked, {"iterations": iterations, "solver": solver}, "model")
         newton = (asked.solver or self.training.solver) == "newton"
-        count = asked.iterations or (256 if newton else None)
+        count = asked.iterations or (subspaces.ALL if newton else None)
         scene = scene.iterated(count, scene.config.anderson_window) if count else scene
         if isinstance(self.reduced, SubspaceModel):
             subspaces.require_holds(scene, self.reduced.columns)

@@ -67,10 +67,9 @@ def plot_cost(table: pd.DataFrame) -> Figure:
 
     A dashed line is the error of the mesh. Settings that blew up or have no error are left out.
     """
-    table = table[np.isfinite(table.position_error)].assign(
-        error=table.position_error.clip(LOW, HIGH),
-        place=table.setting.str.replace(COUNT, "", regex=True).map(style.plain_words),
-    )
+    table = table[np.isfinite(table.position_error)]
+    places = table.setting.str.replace(COUNT, "", regex=True).map(style.plain_words)
+    table = table.assign(error=table.position_error.clip(LOW, HIGH), place=places)
     with style.look():
         figure = style.new_figure(3.5)
         ax = figure.subplots()

@@ -77,9 +77,9 @@ def test_a_table_has_settings_of_own_and_coarser_grids_and_of_a_model_cheapest_f
 
 
 def test_three_meshes_estimate_the_error_of_the_finest():
-    fine = sheet(mesh=SHEET | {"rows": 13, "columns": 13}, frames=3)
+    fine = sheet(mesh=SHEET | {"rows": 13, "columns": 13}, frames=20)
     runs = [converged_run(fine, 1e-6, 20_000)]
-    meshes = coarser.grids(fine, (1 / 2, 1 / 4))
+    meshes = coarser.grids(fine, (0.5, 0.25))
     expected = coarser.error_of_mesh(*runs, meshes, [m.converged(1e-6, 20_000) for m in meshes])
     found = api.cost(fine).attrs["mesh_error"]
     assert found == pytest.approx(expected, rel=1e-3)

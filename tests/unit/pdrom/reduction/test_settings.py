@@ -9,7 +9,7 @@ from pdrom.model.runs import converged_run, trajectory
 from pdrom.model.scene import Scene
 from pdrom.reduction import settings
 from pdrom.reduction.deviations import Yardstick
-from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.model import SubspaceModel, reduced
 from pdrom.reduction.subspace.training import make_columns
 
 SPRING = {"effect": "spring", "weight": 1e4}
@@ -55,7 +55,7 @@ def test_a_converged_setting_has_no_error_and_more_iterations_less(scene, truth)
 def test_a_model_of_all_columns_is_the_full_order_and_newton_the_converged_step(scene, truth):
     columns = make_columns([scene], truth.reference[1:], 0, 0, np.eye(scene.mesh.vertices), ())
     model = SubspaceModel(columns)
-    five, exact = (settings.reduced({}, scene, model, count) for count in (5, None))
+    five, exact = (reduced({}, scene, model, count) for count in (5, None))
     assert five.run(8, 1.0) == pytest.approx(trajectory(scene.iterated(5)), abs=1e-9)
     assert exact.errors(truth)[1] < 1e-4
     assert five.output is not None
