@@ -3,8 +3,9 @@
 import logging
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,8 @@ def cost(
     meshes.sort(key=lambda each: -each.scene.mesh.vertices)
     tried = list(_full_order(scene, meshes))
     for number, model in enumerate(models, start=1):
-        tried += _of_model(scene, model, number)
+        with _naming(model):
+            tried += _of_model(scene, model, number)
     tick = progress(f"{name}, converged", frames)
     reference = converged_run(scene, tolerance_of(scene), EVALUATIONS, tick)
     if reference is None:
@@ -97,6 +99,7 @@ def cost(
     error = table.position_error.fillna(0.0)  # nothing moves: every setting is exact
     best = settings.pareto(error.tolist(), table.ms.tolist())
     table["best"] = np.array(best) & np.isfinite(error)
+    log.info("%s: estimating the error of the mesh by coarser ones", name)
     ends = meshes[:: max(1, len(meshes) - 1)]
     runs = [mesh.converged(tolerance_of(mesh.scene), EVALUATIONS) for mesh in ends[1:] and ends]
     table = table.sort_values("ms", ignore_index=True)
@@ -106,17 +109,26 @@ def cost(
     return table
 
 
+@contextmanager
+def _naming(given: Any) -> Iterator[None]:
+    """Begin messages of errors about ``given`` with its name if it is a file."""
+    path = None if isinstance(given, (Mesh, Model)) else files.file_path(given)
+    try:
+        yield
+    except PdromError as error:
+        if path is None:
+            raise
+        fault = str(error).removeprefix(f"{path}: ").removeprefix(f"{path.name}: ")
+        raise type(error)(f"{path}: {fault}") from error
+
+
 def _coarser(scene: Scene, given: Any) -> Coarser:
     """Return ``scene`` on the mesh ``given``, or in this file, read as the scene's own file is."""
-    if isinstance(given, Mesh):
-        return on_mesh(scene, given)
-    path, own = files.file_path(given), scene.config.mesh
+    own, path = scene.config.mesh, Path() if isinstance(given, Mesh) else files.file_path(given)
     like = own if isinstance(own, MeshFile) else MeshFile(kind="file", path="any")
-    try:
-        return on_mesh(scene, like.model_copy(update={"path": path.name}).build(path.parent))
-    except PdromError as error:
-        fault = str(error).removeprefix(f"{path}: ").removeprefix(f"{path.name}: ")
-        raise ConfigurationError(f"{path}: {fault}") from error
+    file = like.model_copy(update={"path": path.name})
+    with _naming(given):
+        return on_mesh(scene, given if isinstance(given, Mesh) else file.build(path.parent))
 
 
 def _full_order(scene: Scene, meshes: Sequence[Coarser]) -> Iterator[Setting]:

@@ -41,7 +41,8 @@ def perform(arguments: argparse.Namespace) -> Status:
 def shown(table: "pd.DataFrame", frames: int) -> str:
     """Lines of a ``table`` by `pdrom.api.cost` of a scene with ``frames``, and what they mean."""
     marked = table.best.map({True: "* ", False: "  "}) + table.setting
-    columns = {"setting": marked.str.ljust(marked.str.len().max())}
+    width = marked.str.len().max()
+    columns = {"  setting".ljust(width): marked.str.ljust(width)}
     for name in ("position_error", "deformation_error"):
         columns[name.replace("_", " ")] = table[name].map(lambda e: ERROR.get(str(e), f"{e:.2g}"))
     columns["ms a frame"] = table.ms.map("{:.3g}".format)

@@ -9,7 +9,7 @@ import pytest
 from builders import GRAVITY, LEFT, make_scene
 from pdrom import api
 from pdrom.api.pictures import plot_cost
-from pdrom.core.errors import ConfigurationError, PdromError, SolverError
+from pdrom.core.errors import ConfigurationError, PdromError, SceneError, SolverError
 from pdrom.model import coarser
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.runs import converged_run
@@ -34,7 +34,7 @@ def counting(monkeypatch):
     monkeypatch.setattr(MODULE, "timed", counted)
 
 
-def test_a_table_has_settings_of_own_and_coarser_grids_and_of_a_model_cheapest_first():
+def test_a_table_has_settings_of_own_and_coarser_grids_and_of_a_model_cheapest_first(tmp_path):
     model = api.train(api.run(sheet()), modes=10)
     table = api.cost(sheet(iterations=4), models=[model])
     assert table.columns.tolist() == [
@@ -56,8 +56,9 @@ def test_a_table_has_settings_of_own_and_coarser_grids_and_of_a_model_cheapest_f
     figure = plot_cost(table)
     assert len(figure.axes[0].texts) == len(table)
     assert {"model 1", "16 vertices"} <= {text.get_text() for text in figure.legends[0].texts}
-    with pytest.raises(ConfigurationError, match="mesh"):
-        api.cost(sheet(size=7), models=[model])
+    model.save(tmp_path / "own.h5")
+    with pytest.raises(ConfigurationError, match=f"^{tmp_path}/own.h5: scene 'test': another mesh"):
+        api.cost(sheet(size=7), models=[tmp_path / "own.h5"])
 
 
 def test_two_coarser_meshes_estimate_the_error_of_the_mesh():
@@ -92,7 +93,7 @@ def test_files_are_read_as_the_mesh_of_the_scene(tmp_path):
     mesh = {"kind": "file", "path": "fine.obj", "scale": 1e-3}
     assert set(api.cost(api.build_scene(tmp_path, mesh, **keys), [path]).vertices) == {35, 12}
     unscaled = api.build_scene(mesh=(fine.points, fine.triangles), **keys)
-    with pytest.raises(ConfigurationError, match=f"^{path}: scene 'scene': .* another unit"):
+    with pytest.raises(SceneError, match=f"^{path}: scene 'scene': .* another unit"):
         api.cost(unscaled, [path])
 
 
