@@ -72,7 +72,7 @@ def cost(
         if not isinstance(given, (list, tuple)):
             raise ConfigurationError(f"{what} = {shown(given, 60)}: a list is required")
     name, frames = scene.config.name, scene.config.frames
-    meshes = [_coarser(scene, each) for each in coarser] or grids(scene, PARTS)
+    meshes = [_coarser(scene, each) for each in coarser] or _grids(scene)
     meshes.sort(key=lambda each: -each.scene.mesh.vertices)
     tried = list(_full_order(scene, meshes))
     for number, model in enumerate(models, start=1):
@@ -103,9 +103,8 @@ def cost(
     ends = meshes[:: max(1, len(meshes) - 1)]
     runs = [mesh.converged(tolerance_of(mesh.scene), EVALUATIONS) for mesh in ends[1:] and ends]
     table = table.sort_values("ms", ignore_index=True)
-    table.attrs = {
-        "frames": few, "busy": busy, "mesh_error": error_of_mesh(reference, ends, runs)
-    }  # fmt: skip
+    mesh_error = error_of_mesh(reference, ends, runs)
+    table.attrs = {"frames": few, "busy": busy, "mesh_error": mesh_error}
     return table
 
 
@@ -129,6 +128,17 @@ def _coarser(scene: Scene, given: Any) -> Coarser:
     file = like.model_copy(update={"path": path.name})
     with _naming(given):
         return on_mesh(scene, given if isinstance(given, Mesh) else file.build(path.parent))
+
+
+def _grids(scene: Scene) -> list[Coarser]:
+    """Return ``scene`` on coarser grids of different sizes, without those that do not suit it."""
+    found: dict[int, Coarser] = {}
+    for part in PARTS:
+        try:
+            found |= {each.scene.mesh.vertices: each for each in grids(scene, [part])}
+        except PdromError as error:
+            log.warning("without the grid of %.2g times the cells a side: %s", part, error)
+    return [*found.values()]
 
 
 def _full_order(scene: Scene, meshes: Sequence[Coarser]) -> Iterator[Setting]:

@@ -84,6 +84,20 @@ def test_a_body_that_is_rigid_or_at_rest_or_blows_up_has_no_such_errors(monkeypa
     assert len(plot_cost(table).axes[0].texts) == 0
 
 
+def test_a_grid_that_an_effect_does_not_suit_is_left_out(caplog):
+    x, y, z = sheet(size=13).mesh.points[
+        6 + 13
+    ]  # no vertex of the grid with a quarter of the cells
+    box = {
+        "kind": "box",
+        "lower": [x - 0.01, y - 1.0, z - 0.01],
+        "upper": [x + 0.01, y + 1.0, z + 0.01],
+    }
+    table = api.cost(sheet(GRAVITY, SPRING, {"effect": "pins", "select": box}, size=13, frames=2))
+    assert set(table.vertices) < {169, 49, 25, 16}
+    assert "times the cells a side: scene 'test', effect 'pins': selection" in caplog.text
+
+
 def test_files_are_read_as_the_mesh_of_the_scene(tmp_path):
     fine, coarse = cloth(7, 5, wave=0.25), cloth(4, 3, wave=0.25)
     for name, mesh in (("fine", fine), ("coarse", coarse)):
