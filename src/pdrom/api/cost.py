@@ -3,88 +3,83 @@
 import logging
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
-from functools import partial
-from time import perf_counter, process_time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pdrom.api import files
-from pdrom.api.model import BUSY, Model, OnFrame, load_model, silent
-from pdrom.api.training import EVALUATIONS, Progress, converged_positions
+from pdrom.api.model import Model, load_model, silent, timed
+from pdrom.api.training import EVALUATIONS, Progress, tolerance_of
 from pdrom.core.errors import ConfigurationError, NotReducibleError, PdromError, SolverError
 from pdrom.core.yamlfile import shown
 from pdrom.model.coarser import Coarser, error_of_mesh, grids, on_mesh
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.mesh.types import Mesh
+from pdrom.model.runs import converged_run
 from pdrom.model.scene import Scene
 from pdrom.reduction import settings
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.settings import Setting
-from pdrom.reduction.subspace.model import SubspaceModel
-from pdrom.reduction.timing import measure
+from pdrom.reduction.subspace.model import SubspaceModel, reduced
 
 log = logging.getLogger(__name__)
 # Iterations of a frame and window of Anderson acceleration (0: none), on coarser meshes fewer.
-WINDOW = 5
-COUNTS = ((1, 0), (2, 0), (3, 0), (5, 0), (10, 0), (5, WINDOW), (10, WINDOW))
-ON_COARSER = ((2, 0), (5, 0), (5, WINDOW))
+COUNTS = ((1, 0), (2, 0), (3, 0), (5, 0), (10, 0), (5, 5), (10, 5))
+ON_COARSER = ((2, 0), (5, 0), (5, 5))
 PARTS = (1 / 2, 1 / 3, 1 / 4)  # of the cells along a side of a generated grid
 ITERATIONS = 5  # of models, if they do not converge
-FRAMES, WARMUP, REPEATS = 60, 1, 3  # most frames that are timed, and runs of them
-MODEL = "model"
-File = str | os.PathLike[str]
+FRAMES, REPEATS = 60, 3  # most frames that are timed, and runs of them
+ERRORS = ["position_error", "deformation_error"]
 
 
 def cost(
     scene: Scene,
-    coarser: Sequence[Mesh | File] = (),
-    models: Sequence[Model | File] = (),
+    coarser: Sequence[Mesh | str | os.PathLike[str]] = (),
+    models: Sequence[Model | str | os.PathLike[str]] = (),
     progress: Progress = lambda name, frames: silent,
 ) -> pd.DataFrame:
-    """Compare settings of a scene, each with its error against the converged step and its time.
-
-    Settings are numbers of iterations, with and without Anderson acceleration, on the scene's own
-    and on coarser meshes, and reduced models.
+    """Compare iterations, coarser meshes and models of a scene by error and time.
 
     Parameters
     ----------
     scene : scene made by `build_scene` or `load_scene`
-    coarser : meshes, or their files, that fill the same space with fewer vertices; without any, a
-        scene on a generated grid gets those with a half, a third and a quarter of its cells a side
+    coarser : meshes with fewer vertices, or their files; without any, a scene on a generated grid
+        gets those with a half, a third and a quarter of its cells along a side
     models : models of the scene's mesh, or their files
-    progress : called with name and number of frames of each converged run; returns a function that
-        is called after each of its frames
+    progress : called with name and number of frames of the converged run; returns a function that
+        is called after each frame
 
     Returns
     -------
     DataFrame
-        Cheapest first: ``setting`` in words, ``method``, ``iterations`` of a frame (NA: until it
-        has converged), ``vertices`` of the simulated mesh, ``position_error``,
-        ``deformation_error`` (NaN of a rigid body; inf: blew up), ``ms`` per frame, and ``best``:
-        no other setting is as good in position error and time and better in one. Its ``attrs``:
-        ``frames`` (the first ones) that were timed, ``busy`` (other programs ran: times mean
-        nothing), and ``mesh_error`` of the scene's mesh, estimated from two coarser ones, or None.
+        Cheapest first: ``setting`` in words, ``method``, ``iterations`` of a frame (NA: converged),
+        ``vertices`` that are simulated, `ERRORS` against the converged step (NaN of a rigid body,
+        inf: blew up), ``ms`` per frame, ``best`` (no other setting is as good in position error and
+        time and better in one). ``attrs`` are ``frames`` that were timed, ``busy`` (other programs
+        ran: times mean nothing), ``mesh_error`` (see `error_of_mesh`).
 
     Raises
     ------
-    ConfigurationError, SceneError, MeshError, StorageError
-        A wrong argument or file; a mesh that is no coarser one; a model of another mesh.
-    SolverError
-        A frame of the scene does not converge.
+    ConfigurationError, SceneError, MeshError, StorageError, SolverError
+        A wrong argument or file; no coarser mesh; a model of another mesh; no convergence.
     """
-    files.require_runnable(scene, None, silent)
-    files.require_function(progress, "progress", "a name and a number")
-    meshes = [_coarser(scene, each) for each in _items(coarser, "coarser")] or grids(scene, PARTS)
+    files.require_runnable(scene, None, progress, "progress")
+    for given, what in ((coarser, "coarser"), (models, "models")):
+        if not isinstance(given, (list, tuple)):
+            raise ConfigurationError(f"{what} = {shown(given, 60)}: a list is required")
+    name, frames = scene.config.name, scene.config.frames
+    meshes = [_coarser(scene, each) for each in coarser] or _grids(scene)
     meshes.sort(key=lambda each: -each.scene.mesh.vertices)
     tried = list(_full_order(scene, meshes))
-    for number, model in enumerate(_items(models, "models"), start=1):
-        tried += _of_model(scene, model, number)
-    name, frames = scene.config.name, min(FRAMES, scene.config.frames)
-    reference = converged_positions(scene, progress)
+    for number, model in enumerate(models, start=1):
+        with _naming(model):
+            tried += _of_model(scene, model, number)
+    tick = progress(f"{name}, converged", frames)
+    reference = converged_run(scene, tolerance_of(scene), EVALUATIONS, tick)
     if reference is None:
         raise SolverError(
             f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations, so that "
@@ -93,91 +88,82 @@ def cost(
     truth, rows = Yardstick(scene, reference), []
     for number, setting in enumerate(tried, start=1):
         log.info("%s: setting %d of %d, %s", name, number, len(tried), setting.labels["setting"])
-        positions, *found = setting.errors(truth)
-        errors = [np.inf] * 2 if positions is None else [np.nan if e is None else e for e in found]
-        rows.append(dict(zip(("position_error", "deformation_error"), errors, strict=True)))
-    log.info("%s: timing %d settings in turn, over %d frames", name, len(tried), frames)
-    order = np.random.default_rng(0).permutation(len(tried))
-    wall, used = perf_counter(), process_time()
-    times = measure([tried[i].variant({}, frames) for i in order], WARMUP, REPEATS)
-    busy = perf_counter() - wall > BUSY * (process_time() - used)
-    for i, time in zip(order, times, strict=True):
-        rows[i] = {**tried[i].labels, **rows[i], "ms": time["ms_per_frame"]}
-    table = pd.DataFrame(rows).astype({"iterations": "Int64"})
+        found, *errors = setting.errors(truth)
+        errors = [np.inf, np.inf] if found is None else errors
+        rows.append({**setting.labels, **dict(zip(ERRORS, errors, strict=True))})
+    table = pd.DataFrame(rows).astype({"iterations": "Int64", **dict.fromkeys(ERRORS, float)})
+    few, order = min(FRAMES, frames), np.random.default_rng(0).permutation(len(tried))
+    log.info("%s: timing all settings in turn, over %d frames", name, few)
+    times, busy = timed([tried[i].variant({}, few) for i in order], REPEATS)
+    table.loc[order, "ms"] = times
     error = table.position_error.fillna(0.0)  # nothing moves: every setting is exact
     best = settings.pareto(error.tolist(), table.ms.tolist())
-    table = table.assign(best=np.array(best) & np.isfinite(error)).sort_values("ms")
-    table.attrs = {
-        "frames": frames, "busy": busy,
-        "mesh_error": _mesh_error(meshes, reference, progress),
-    }  # fmt: skip
-    return table.reset_index(drop=True)
+    table["best"] = np.array(best) & np.isfinite(error)
+    log.info("%s: estimating the error of the mesh by coarser ones", name)
+    ends = meshes[:: max(1, len(meshes) - 1)]
+    runs = [mesh.converged(tolerance_of(mesh.scene), EVALUATIONS) for mesh in ends[1:] and ends]
+    table = table.sort_values("ms", ignore_index=True)
+    mesh_error = error_of_mesh(reference, ends, runs)
+    table.attrs = {"frames": few, "busy": busy, "mesh_error": mesh_error}
+    return table
 
 
-def _items(given: Any, name: str) -> list[Any]:
-    if isinstance(given, (list, tuple)):
-        return list(given)
-    raise ConfigurationError(f"{name} = {shown(given, 60)}: a list is required")
+@contextmanager
+def _naming(given: Any) -> Iterator[None]:
+    """Begin messages of errors about ``given`` with its name if it is a file."""
+    path = None if isinstance(given, (Mesh, Model)) else files.file_path(given)
+    try:
+        yield
+    except PdromError as error:
+        if path is None:
+            raise
+        fault = str(error).removeprefix(f"{path}: ").removeprefix(f"{path.name}: ")
+        raise type(error)(f"{path}: {fault}") from error
 
 
 def _coarser(scene: Scene, given: Any) -> Coarser:
     """Return ``scene`` on the mesh ``given``, or in this file, read as the scene's own file is."""
-    if isinstance(given, Mesh):
-        return on_mesh(scene, given)
-    path = files.file_path(given)
-    try:
-        own, found = scene.config.mesh, path.resolve()
-        like = own if isinstance(own, MeshFile) else MeshFile(kind="file", path="any")
-        config = like.model_copy(update={"path": found.name})
-        return on_mesh(scene, config.build(found.parent))
-    except (OSError, RuntimeError) as error:
-        raise ConfigurationError(f"{path}: leads nowhere") from error
-    except PdromError as error:
-        fault = str(error).removeprefix(f"{path.name}: ")
-        raise ConfigurationError(f"{path}: {fault}") from error
+    own, path = scene.config.mesh, Path() if isinstance(given, Mesh) else files.file_path(given)
+    like = own if isinstance(own, MeshFile) else MeshFile(kind="file", path="any")
+    file = like.model_copy(update={"path": path.name})
+    with _naming(given):
+        return on_mesh(scene, given if isinstance(given, Mesh) else file.build(path.parent))
+
+
+def _grids(scene: Scene) -> list[Coarser]:
+    """Return ``scene`` on coarser grids of different sizes, without those that do not suit it."""
+    found: dict[int, Coarser] = {}
+    for part in PARTS:
+        try:
+            found |= {each.scene.mesh.vertices: each for each in grids(scene, [part])}
+        except PdromError as error:
+            log.warning("without the grid of %.2g times the cells a side: %s", part, error)
+    return [*found.values()]
 
 
 def _full_order(scene: Scene, meshes: Sequence[Coarser]) -> Iterator[Setting]:
     config = scene.config
     counts = dict.fromkeys((*COUNTS, (config.iterations, config.anderson_window)))
-    coarse = settings.full_order(scene, ON_COARSER, meshes)
-    for setting in (*settings.full_order(scene, counts), *coarse):
-        labels, plain = setting.labels, (settings.PLAIN, settings.COARSER)
-        words = f"{labels['iterations']} iteration{'s' * (labels['iterations'] > 1)}"
-        words += ", Anderson" * (labels["method"] not in plain)
-        if labels["vertices"] < scene.mesh.vertices:
-            words += f" on {labels['vertices']:,} vertices"
-        yield replace(setting, labels={"setting": words, **labels})
+    own, coarse = (settings.full_order(scene, *a) for a in ((counts,), (ON_COARSER, meshes)))
+    for setting in (*own, *coarse):
+        count, method = (setting.labels[key] for key in ("iterations", "method"))
+        words = f"{count} iteration{'s' * (count > 1)}"
+        words += ", Anderson" * (method in (settings.ANDERSON, settings.COARSER_ANDERSON))
+        if (size := setting.labels["vertices"]) < scene.mesh.vertices:
+            words += f" on {size:,} vertices"
+        yield replace(setting, labels={"setting": words, **setting.labels})
 
 
 def _of_model(scene: Scene, given: Any, number: int) -> Iterator[Setting]:
     """Yield settings of a model or its file; one that cannot run ``scene`` raises an error."""
-    name = str(number) if isinstance(given, Model) else files.file_path(given).name
-    model = given if isinstance(given, Model) else load_model(given)
-    labels = {"method": MODEL, "iterations": ITERATIONS, "vertices": scene.mesh.vertices}
-    labels = {"setting": f"model {name}, {ITERATIONS} iterations", **labels}
-    loop = model.loop(scene.iterated(ITERATIONS), solver="local_global")
-    if not isinstance(model.reduced, SubspaceModel):
-        yield Setting(labels, *loop)
-        return
-    yield settings.reduced(labels, scene, model.reduced, ITERATIONS)
-    labels |= {"setting": f"model {name}, converged", "iterations": None}
-    with suppress(NotReducibleError):  # Newton's method needs derivatives of every group
-        yield settings.reduced(labels, scene, model.reduced, None)
-
-
-def _mesh_error(
-    meshes: Sequence[Coarser], reference: np.ndarray, progress: Progress
-) -> float | None:
-    """Estimate the relative error of the scene's mesh by two of the coarser ``meshes``."""
-    ends, runs = [meshes[0], meshes[-1]] if len(meshes) > 1 else [], []
-    for mesh in ends:
-        found = converged_positions(mesh.scene, partial(_on, progress, mesh.scene.mesh.vertices))
-        if found is None:
-            return None
-        runs.append(np.stack([mesh.positions(y) for y in found]))
-    return error_of_mesh(reference, ends, runs)
-
-
-def _on(progress: Progress, vertices: int, name: str, frames: int) -> OnFrame:
-    return progress(f"{name} on {vertices:,} vertices", frames)
+    own = isinstance(given, Model)
+    model, name = (given, number) if own else (load_model(given), files.file_path(given).name)
+    for count, solved in ((ITERATIONS, f"{ITERATIONS} iterations"), (None, "converged")):
+        labels = {"setting": f"model {name}, {solved}", "method": "model", "iterations": count}
+        labels["vertices"] = scene.mesh.vertices
+        loop = model.loop(scene.iterated(ITERATIONS), solver="local_global")
+        if isinstance(model.reduced, SubspaceModel):
+            with suppress(NotReducibleError):  # Newton's method needs derivatives of every group
+                yield reduced(labels, scene, model.reduced, count)
+        elif count:
+            yield Setting(labels, *loop)

@@ -40,21 +40,16 @@ def require_run(value: Any, name: str) -> Run:
     return run
 
 
-def require_runnable(scene: Any, out: Any, on_frame: Any) -> None:
+def require_runnable(scene: Any, out: Any, function: Any, name: str = "on_frame") -> None:
     """Raise ConfigurationError or StorageError unless a run can have these arguments."""
     require(Scene, scene, "scene", source="build_scene and load_scene make one")
-    require_function(on_frame, "on_frame", "a number and a report")
+    try:
+        signature(function).bind(0, None)
+    except (TypeError, ValueError) as error:
+        fault = "a function of two arguments is required"
+        raise ConfigurationError(f"{name} = {shown(function, 60)}: {fault}") from error
     if out is not None:
         store.require_own(file_path(out))
-
-
-def require_function(value: Any, name: str, takes: str) -> None:
-    """Raise ConfigurationError unless ``value`` is a function of two arguments, ``takes``."""
-    try:
-        signature(value).bind(0, None)
-    except (TypeError, ValueError) as error:
-        fault = f"a function of {takes} is required"
-        raise ConfigurationError(f"{name} = {shown(value, 60)}: {fault}") from error
 
 
 def file_path(path: Any) -> Path:

@@ -33,6 +33,7 @@ from pdrom.reduction.subspace.exported import export_page
 from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
+from pdrom.reduction.timing import Variant, measure
 from pdrom.view.page import LIVE, page_of, view_of
 
 FORMAT = 1  # version of the file of a model
@@ -160,7 +161,7 @@ class Model:
         require_same_mesh(self.scene, scene)
         asked = validate(_Asked, {"iterations": iterations, "solver": solver}, "model")
         newton = (asked.solver or self.training.solver) == "newton"
-        count = asked.iterations or (256 if newton else None)
+        count = asked.iterations or (subspaces.ALL if newton else None)
         scene = scene.iterated(count, scene.config.anderson_window) if count else scene
         if isinstance(self.reduced, SubspaceModel):
             subspaces.require_holds(scene, self.reduced.columns)
@@ -219,20 +220,15 @@ class Model:
     def speed(self, scene: Scene, repeats: int = 3) -> dict[str, Any]:
         """Measure the model and the full order in turn, in this process, on ``scene``.
 
-        Return ``ms`` and ``full_ms`` per frame, medians of ``repeats`` runs of all frames, their
+        Return ``ms`` and ``full_ms`` per frame, of all frames, each of its median repeat, their
         ratio ``speedup``, and ``busy``, whether other programs took the processor meanwhile.
         """
         files.require_runnable(scene, None, silent)
-        frames = scene.config.frames
-        made: list[tuple[Stepper, State, Callable[..., Any]]] = [
-            (*self.loop(scene), self._lift()),
-            (scene.stepper(track_objective=False), scene.initial_state(), lambda q: q),
-        ]
-        for one in made:
-            _ms(*one, 1)  # loads compiled code
-        spent = np.array([[_ms(*one, frames) for one in made] for _ in range(repeats)])
-        (ms, full), shares = np.median(spent[..., 0], axis=0), spent[..., 0] / spent[..., 1]
-        busy = bool(np.median(shares, axis=0).max() > BUSY)
+        frames, lift = scene.config.frames, self._lift()
+        own = Variant({}, *self.loop(scene), frames, output=lift, warm=1)
+        loop = scene.stepper(track_objective=False)
+        every = [own, Variant({}, loop, scene.initial_state(), frames, warm=1)]
+        (ms, full), busy = timed(every, repeats)
         return {"ms": ms, "full_ms": full, "speedup": full / ms, "busy": busy}
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -347,13 +343,11 @@ def worst_errors(validation: pd.DataFrame) -> list[float]:
     return [float(validation[f"{kind}_error"].max()) for kind in ("position", "deformation")]
 
 
-def _ms(loop: Stepper, start: State, lift: Callable[..., Any], frames: int) -> tuple[float, float]:
-    """Milliseconds per frame, wall and processor time, of ``frames`` frames of ``loop``."""
+def timed(variants: Sequence[Variant], repeats: int) -> tuple[list[float], bool]:
+    """Milliseconds per frame of each of ``variants``, and whether other programs ran meanwhile."""
     wall, used = perf_counter(), process_time()
-    for state, _ in loop.run(start, range(frames)):
-        lift(state.positions)
-    spent = perf_counter() - wall, max(process_time() - used, 1e-9)
-    return 1e3 * spent[0] / frames, 1e3 * spent[1] / frames
+    spent = [row["ms_per_frame"] for row in measure(variants, 1, repeats)]
+    return spent, perf_counter() - wall > BUSY * (process_time() - used)
 
 
 def _put(file: h5py.Group, name: str, values: Any, unit: str) -> None:

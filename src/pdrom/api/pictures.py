@@ -1,23 +1,22 @@
 """Plots of errors, and HTML pages that show runs."""
 
 import os
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from pdrom.api.cost import MODEL
 from pdrom.api.files import file_path, require_run
 from pdrom.api.records import Run
 from pdrom.core.errors import SceneError
 from pdrom.core.store import require_own
-from pdrom.reduction.settings import COARSER, COARSER_ANDERSON
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.frames import write_frames
 from pdrom.view.page import ViewedRun, ViewedScene, write_page
 
 LOW, HIGH = 1e-7, 1e3  # limits of the error axis; errors outside are drawn on the limit
+# The part of a setting in words that does not name its mesh or model.
+COUNT = r"(^|, )(converged|\d+ iterations?(, Anderson)?)( on )?"
 
 
 def plot(reference: Run, *runs: Run) -> Figure:
@@ -64,43 +63,30 @@ def plot(reference: Run, *runs: Run) -> Figure:
 
 
 def plot_cost(table: pd.DataFrame) -> Figure:
-    """Plot position error against time of the settings in a ``table`` by `pdrom.api.cost`.
+    """Plot error against time of a ``table`` by `pdrom.api.cost`; a line joins the best settings.
 
-    A line joins the best ones, a dashed line is the error of the mesh; a setting that blew up or
-    has no error is left out.
+    A dashed line is the error of the mesh. Settings that blew up or have no error are left out.
     """
-    shown = table[np.isfinite(table.position_error)]
-    error = shown.position_error.clip(LOW, HIGH)
+    table = table[np.isfinite(table.position_error)]
+    places = table.setting.str.replace(COUNT, "", regex=True).map(style.plain_words)
+    table = table.assign(error=table.position_error.clip(LOW, HIGH), place=places)
     with style.look():
         figure = style.new_figure(3.5)
         ax = figure.subplots()
-        best = shown.best
-        ax.plot(shown.ms[best], error[best], color=style.GREY, zorder=1, label="best settings")
-        names = pd.Series([_place(row) for row in shown.itertuples()], shown.index, str)
-        for i, name in enumerate(names.unique()):
-            own = names == name
-            ax.scatter(shown.ms[own], error[own], color=style.CYCLE[i % 8], label=name)
-        for row, y in zip(shown.itertuples(), error, strict=True):
-            text = "converged" if pd.isna(row.iterations) else str(row.iterations)
-            text += " A" * ("Anderson" in row.setting)
-            ax.annotate(text, (row.ms, y), (3, 3), textcoords="offset points", fontsize=7)
-        if table.attrs["mesh_error"] is not None:
-            ax.axhline(
-                table.attrs["mesh_error"], color=style.BLACK, ls="--", label="error of the mesh"
-            )
+        best, mesh = table[table.best], table.attrs["mesh_error"]
+        ax.plot(best.ms, best.error, color=style.GREY, zorder=1, label="best settings")
+        for i, (place, own) in enumerate(table.groupby("place")):
+            label = place or "scene's own mesh"
+            ax.scatter(own.ms, own.error, color=style.CYCLE[i % len(style.CYCLE)], label=label)
+        for row in table.itertuples():
+            text = f"{row.iterations}{' A' * ('Anderson' in row.setting)}".replace("<NA>", "N")
+            ax.annotate(text, (row.ms, row.error), (3, 3), textcoords="offset points")
+        if mesh is not None:
+            ax.axhline(mesh, color=style.BLACK, ls="--", label="error of the mesh")
         ax.set(xscale="log", yscale="log", ylabel="position error")
-        ax.set_xlabel("ms a frame (marks: iterations of a frame; A: Anderson acceleration)")
-        ax.grid(True)
+        ax.set_xlabel("ms a frame (marks: iterations; A: Anderson acceleration; N: Newton)")
         style.legend(figure, ax.get_legend_handles_labels()[0], 3)
     return figure
-
-
-def _place(row: Any) -> str:
-    """Name of the mesh or model that a ``row`` of a table by `pdrom.api.cost` simulates."""
-    if row.method == MODEL:
-        return style.plain_words(row.setting.rpartition(", ")[0])
-    coarser = "coarser mesh, " * (row.method in (COARSER, COARSER_ANDERSON))
-    return f"{coarser}{row.vertices:,} vertices"
 
 
 def view(path: str | os.PathLike[str], *runs: Run) -> None:

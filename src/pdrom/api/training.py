@@ -250,11 +250,10 @@ def _variations(scene: Scene, kind: str, count: int, seed: int) -> list[Scene]:
     return [Scene.build(config, scene.mesh, scene.masses) for config in configs]
 
 
-def converged_positions(scene: Scene, progress: Progress) -> np.ndarray | None:
-    """Positions (F + 1, N, 3) m of ``scene`` with converged frames; None if one does not."""
-    tick = progress(f"{scene.config.name}, converged", scene.config.frames)
+def tolerance_of(scene: Scene) -> float:
+    """Tolerance of a converged frame: part of the mesh that one more iteration may move."""
     own = UNNOTICED * scene.config.time_step**2 / scene.mesh.extent
-    return converged_run(scene, min(CONVERGED, max(own, ROUNDOFF)), EVALUATIONS, tick)
+    return min(CONVERGED, max(own, ROUNDOFF))
 
 
 def _reference(scene: Scene, converged: bool, progress: Progress) -> Run:
@@ -264,7 +263,8 @@ def _reference(scene: Scene, converged: bool, progress: Progress) -> Run:
         return run(scene, on_frame=progress(name, frames))
     started = perf_counter()
     log.info("%s: solving every frame to convergence", name)
-    found = converged_positions(scene, progress)
+    tick = progress(f"{name}, converged", frames)
+    found = converged_run(scene, tolerance_of(scene), EVALUATIONS, tick)
     if found is None:
         raise NotReducibleError(
             f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations; "

@@ -10,7 +10,8 @@ from pdrom.command.base import SCENE, Command, Status, files_of, require_output
 if TYPE_CHECKING:
     import pandas as pd
 
-HEADS = ("  setting", "position error", "deformation error", "ms a frame")
+ERROR = {"nan": "-", "inf": "blew up"}
+SEVERAL = {"nargs": "+", "default": []}
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -19,51 +20,43 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.api.pictures import plot_cost
     from pdrom.command.progress import Progress
     from pdrom.core.errors import ConfigurationError
-    from pdrom.view.frames import write_png
+    from pdrom.core.store import MARK, atomic_path
 
     scene, out = load_scene(arguments.scene), arguments.plot
     if out:
         if Path(out).suffix.lower() != ".png":
             raise ConfigurationError(f"--plot {out}: the name of a picture ends in .png")
-        require_output(
-            out, [*files_of(arguments.scene, scene), *arguments.coarser, *arguments.model]
-        )
+        read = files_of(arguments.scene, scene)
+        require_output(out, [*read, *arguments.coarser, *arguments.model])
     table = cost(scene, arguments.coarser, arguments.model, Progress)
     sys.stdout.write(f"{shown(table, scene.config.frames)}\n")
     if out:
-        write_png(plot_cost(table), Path(out))
+        with atomic_path(out, with_checksum=False) as temporary:
+            mark = {"Software": MARK.decode()}
+            plot_cost(table).savefig(temporary, format="png", dpi=150, metadata=mark)
         sys.stdout.write(f"{out}: position error against time\n")
     return Status.DONE
 
 
 def shown(table: "pd.DataFrame", frames: int) -> str:
     """Lines of a ``table`` by `pdrom.api.cost` of a scene with ``frames``, and what they mean."""
-    rows = [
-        (f"{' *'[row.best]} {row.setting}", _error(row.position_error),
-         _error(row.deformation_error), f"{row.ms:.3g}")
-        for row in table.itertuples()
-    ]  # fmt: skip
-    first, *widths = (max(map(len, column)) for column in zip(HEADS, *rows, strict=True))
+    marked = table.best.map({True: "* ", False: "  "}) + table.setting
+    width = marked.str.len().max()
+    columns = {"  setting".ljust(width): marked.str.ljust(width)}
+    for name in ("position_error", "deformation_error"):
+        columns[name.replace("_", " ")] = table[name].map(lambda e: ERROR.get(str(e), f"{e:.2g}"))
+    columns["ms a frame"] = table.ms.map("{:.3g}".format)
+    busy, error = table.attrs["busy"], table.attrs["mesh_error"]
     lines = [
-        "  ".join([f"{name:<{first}}", *(f"{v:>{w}}" for v, w in zip(values, widths, strict=True))])
-        for name, *values in (HEADS, *rows)
-    ]
-    lines += [
+        table.assign(**columns)[[*columns]].to_string(index=False),
         "* no other setting is as good in position error and time, and better in one of them",
-        f"errors against the converged step over {frames} frames; "
-        f"times of the first {table.attrs['frames']} frames"
-        f"{', unreliable: other programs ran' * table.attrs['busy']}",
+        f"errors against the converged step over {frames} frames; times of the first "
+        f"{table.attrs['frames']} frames{', unreliable: other programs ran' * busy}",
     ]
-    if (error := table.attrs["mesh_error"]) is not None:
-        lines.append(
-            f"estimated position error of the mesh itself: {error:.2g}; a setting with a smaller "
-            "error is no nearer to the body"
-        )
+    if error is not None:
+        what = f"estimated position error of the mesh itself: {error:.2g}"
+        lines.append(f"{what}; a setting with a smaller error is no nearer to the body")
     return "\n".join(lines)
-
-
-def _error(value: float) -> str:
-    return {"nan": "-", "inf": "blew up"}.get(str(value), f"{value:.2g}")
 
 
 COMMAND = Command(
@@ -73,17 +66,11 @@ COMMAND = Command(
         "scene": SCENE,
         "--coarser": {
             "metavar": "MESH",
-            "nargs": "+",
-            "default": [],
             "help": "files of coarser meshes, read as the scene's own; grids are made if left out",
+            **SEVERAL,
         },
-        "--model": {
-            "metavar": "MODEL.h5",
-            "nargs": "+",
-            "default": [],
-            "help": "files by pdrom train, of the scene's mesh",
-        },
-        "--plot": {"metavar": "FILE.png", "help": "picture of error against time"},
+        "--model": {"metavar": "MODEL", "help": "files by pdrom train, of its mesh", **SEVERAL},
+        "--plot": {"metavar": "FILE", "help": "picture of error against time (.png)"},
     },
     perform,
 )

@@ -22,6 +22,7 @@ from pdrom.model.runs import converged_run
 from pdrom.model.scene import Scene
 
 ORDERS = (0.5, 3.0)  # observed orders of convergence for which `mesh_error` tells an error
+CELLS = "triangles", "tetrahedra"
 APART = 0.25  # part of the longest side by which the boxes of two meshes of a body may differ
 
 
@@ -69,29 +70,20 @@ def on_mesh(scene: Scene, mesh: Mesh) -> Coarser:
         ``mesh`` is faulty, has no fewer vertices, fills another space, or has a vertex that no
         vertex of the scene is near to; an effect does not suit it.
     """
-    name, own = scene.config.name, scene.mesh
-    kinds = [bool(len(each.tetrahedra)) for each in (own, mesh)]
+    own, where = scene.mesh, f"scene '{scene.config.name}': the coarser mesh"
+    kinds = [CELLS[len(each.tetrahedra) > 0] for each in (mesh, own)]
     if mesh.vertices >= own.vertices or kinds[0] != kinds[1]:
-        what = "tetrahedra" if kinds[1] else "triangles"
-        raise SceneError(
-            f"scene '{name}': a mesh of {mesh.vertices} vertices and {what} is no coarser mesh of "
-            f"{own.vertices} vertices and {'tetrahedra' if kinds[0] else 'triangles'}"
-        )
-    check_mesh(mesh, f"scene '{name}': coarser mesh")
-    ends = [np.array([m.points.min(axis=0), m.points.max(axis=0)]) for m in (mesh, own)]
-    if np.abs(ends[0] - ends[1]).max() > APART * own.extent:
-        boxes = [", ".join(f"{a:.3g} to {b:.3g}" for a, b in each.T) for each in ends]
-        raise SceneError(
-            f"scene '{name}': the coarser mesh reaches from {boxes[0]} m (x, y, z), the scene's "
-            f"from {boxes[1]} m: it must fill the same space, with the same unit of length"
-        )
+        required = f"fewer than {own.vertices} vertices and {kinds[1]}"
+        raise SceneError(f"{where} has {mesh.vertices} vertices and {kinds[0]}, not {required}")
+    check_mesh(mesh, where)
+    ends = [np.array([each.points.min(axis=0), each.points.max(axis=0)]) for each in (mesh, own)]
+    if (apart := np.abs(ends[0] - ends[1]).max()) > APART * own.extent:
+        raise SceneError(f"{where} ends {apart:.3g} m from the scene's: in another unit of length?")
     matrix = interpolation(mesh, own.points)
     masses = matrix.T @ scene.masses
     if not masses.min() > 0.0:
-        raise SceneError(
-            f"scene '{name}': no vertex is near vertex {int(masses.argmin())} of the coarser mesh: "
-            "it must fill the same space and have larger elements everywhere"
-        )
+        fault = f"no vertex of the scene's mesh is near its vertex {int(masses.argmin())}"
+        raise SceneError(f"{where}: {fault}: it needs larger elements everywhere")
     near = cKDTree(mesh.points).query(own.points)[1]
     effects = [_selecting(each.model_dump(), near) for each in scene.config.effects]
     found = tuple(effect_config(each, i) for i, each in enumerate(effects))

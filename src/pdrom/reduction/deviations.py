@@ -4,7 +4,7 @@ Positions, velocities, shapes (the difference after the best rigid motion of eac
 1976) and the total energy are compared.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -44,6 +44,8 @@ class Reduced(Protocol):
     def loop(self, scene: Scene) -> tuple[Stepper, State]: ...
 
     def positions(self, y: np.ndarray) -> np.ndarray: ...
+
+    def output(self) -> Callable[[np.ndarray], np.ndarray] | None: ...
 
 
 class Yardstick:

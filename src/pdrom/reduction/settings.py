@@ -6,7 +6,6 @@ coarser mesh, or a reduced model.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,13 +15,10 @@ from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.runs import BLOWUP_EXTENT, BoundedRun
 from pdrom.model.scene import Scene
 from pdrom.reduction.deviations import Yardstick
-from pdrom.reduction.subspace.model import SubspaceModel
-from pdrom.reduction.subspace.space import reduced_state
 from pdrom.reduction.timing import Variant
 
 PLAIN, ANDERSON = "projective", "anderson"
 COARSER, COARSER_ANDERSON = "coarser-mesh", "coarser-mesh-anderson"
-ALL = 256  # Newton iterations of a frame that suffice for convergence
 Starts = tuple[tuple[State, int], ...]
 
 
@@ -114,15 +110,6 @@ def loop_of(
     if mesh is None:
         return Setting(labels, loop, start, steps=steps)
     return Setting(labels, loop, start, mesh.positions, mesh.positions, mesh.state, steps)
-
-
-def reduced(
-    labels: dict[str, Any], scene: Scene, model: SubspaceModel, iterations: int | None
-) -> Setting:
-    """Setting with ``model`` of the mesh of ``scene``; iterations None: converged, by Newton."""
-    loop, start = model.loop(scene.iterated(iterations or ALL), iterations is None)
-    state = partial(reduced_state, scene, model.columns)
-    return Setting(labels, loop, start, model.positions, model.output(), state)
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:

@@ -16,8 +16,7 @@ import numpy as np
 
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.scene import Scene
-from pdrom.reduction.sampling.model import ProjectionModel
-from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.deviations import Reduced
 
 log = logging.getLogger(__name__)
 
@@ -57,9 +56,7 @@ class Variant:
     warm: int | None = None
 
 
-def model_variant(
-    labels: dict[str, Any], scene: Scene, model: SubspaceModel | ProjectionModel, frames: int
-) -> Variant:
+def model_variant(labels: dict[str, Any], scene: Scene, model: Reduced, frames: int) -> Variant:
     """Return a variant to be timed: the first ``frames`` frames of ``scene`` with ``model``."""
     return Variant(labels, *model.loop(scene), frames, output=model.output())
 

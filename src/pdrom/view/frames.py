@@ -31,15 +31,9 @@ def frame_numbers(fractions: tuple[float, ...], frames: int) -> list[int]:
 
 def write_frames(scene: ViewedScene, png: Path) -> None:
     """Write the picture of ``scene`` to ``png``."""
-    with style.look():
-        write_png(_draw(scene), png)
-
-
-def write_png(figure: Figure, png: Path) -> None:
-    """Write a ``figure`` to the file ``png``, with the mark that pdrom has made it."""
     with style.look(), atomic_path(png, with_checksum=False) as temporary:
         metadata = {"Software": MARK.decode()}
-        figure.savefig(temporary, format="png", dpi=150, metadata=metadata)
+        _draw(scene).savefig(temporary, format="png", dpi=150, metadata=metadata)
 
 
 def _draw(scene: ViewedScene) -> Figure:

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import h5py
@@ -14,6 +15,7 @@ from pdrom.model.compiled.functions import compiled
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.scene import Scene
+from pdrom.reduction.settings import Setting
 from pdrom.reduction.subspace import columns as spaces
 from pdrom.reduction.subspace import interpolation
 from pdrom.reduction.subspace.ecsw import Samples
@@ -22,6 +24,7 @@ from pdrom.reduction.subspace.interpolation import Interpolation
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 
 ECSW = "ecsw"
+ALL = 256  # Newton iterations of a frame that suffice for convergence
 
 
 def ecsw_name(tolerance: float) -> str:
@@ -79,6 +82,15 @@ class SubspaceModel:
     def output(self, kind: Any = np.float32) -> "Output":
         """Return a faster form of `positions` in the precision ``kind``, for one thread."""
         return Output(self.columns.B, kind)
+
+
+def reduced(
+    labels: dict[str, Any], scene: Scene, model: SubspaceModel, iterations: int | None
+) -> Setting:
+    """Setting with ``model`` of the mesh of ``scene``; iterations None: converged, by Newton."""
+    loop, start = model.loop(scene.iterated(iterations or ALL), iterations is None)
+    state = partial(reduced_state, scene, model.columns)
+    return Setting(labels, loop, start, model.positions, model.output(), state)
 
 
 Labelled = tuple[dict[str, Any], SubspaceModel]

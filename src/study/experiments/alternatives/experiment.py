@@ -34,9 +34,8 @@ from pdrom.reduction.settings import (
     Setting,
     full_order,
     loop_of,
-    reduced,
 )
-from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.subspace.model import SubspaceModel, reduced
 from pdrom.reduction.subspace.training import make_columns, sampled_models
 from pdrom.reduction.timing import Variant
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File

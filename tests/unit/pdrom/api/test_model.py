@@ -161,11 +161,17 @@ def test_speeds_are_of_all_frames_and_a_file_holds_a_model_of_a_body_at_rest(tmp
     assert model.validation[["position_error", "deformation_error"]].isna().all(axis=None)
     model.save(tmp_path / "still.h5")
     assert api.load_model(tmp_path / "still.h5").validation.equals(model.validation)
-    frames = []
+    made = []
+
+    def measure(variants, warmup, repeats):
+        made.extend((one.frames, one.warm, warmup, repeats) for one in variants)
+        return [{"ms_per_frame": 2.0}, {"ms_per_frame": 5.0}]
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pdrom.api.model._ms", lambda *a: frames.append(a[-1]) or (2.0, 1.0))
-        assert model.speed(still)["busy"]
-    assert set(frames) == {1, 4}
+        patch.setattr("pdrom.api.model.measure", measure)
+        patch.setattr("pdrom.api.model.process_time", lambda: 0.0)
+        assert model.speed(still) == {"ms": 2.0, "full_ms": 5.0, "speedup": 2.5, "busy": True}
+    assert made == [(4, 1, 1, 3)] * 2
 
 
 def test_skinning_columns_and_several_runs_enlarge_the_space(full):

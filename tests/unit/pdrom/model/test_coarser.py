@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from builders import GRAVITY, make_scene
-from pdrom.core.errors import MeshError, SceneError
+from pdrom.core.errors import PdromError
 from pdrom.model import coarser
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.mesh.generators import bar, cloth
-from pdrom.model.mesh.types import Mesh
 from pdrom.model.runs import trajectory
 
 BAR = {"kind": "bar", "nx": 9, "ny": 5, "nz": 4}
@@ -57,71 +56,51 @@ def test_a_held_side_moves_as_on_the_fine_mesh():
     assert runs[1][:, side] == pytest.approx(runs[0][:, side])
 
 
-@pytest.mark.parametrize(
-    "select",
-    [[0, 5], {"kind": "union", "of": [[0], [5]]}, {"kind": "complement", "of": [*range(1, 5)]}],
-    ids=["list", "union", "complement"],
-)
+@pytest.mark.parametrize("select", [[0, 5], {"kind": "complement", "of": [*range(1, 5)]}])
 def test_vertices_selected_by_number_are_those_at_the_same_place(select):
     sheet = {"kind": "cloth", "rows": 6, "columns": 6, "plane": "xz"}
     scene = make_scene(SPRING, {"effect": "pins", "select": select}, mesh=sheet)
     (made,) = coarser.grids(scene, (0.6,))
-    corners = scene.mesh.points[[0, 5]]
     held = made.scene.mesh.points[made.scene.boundaries[0].vertices]
-    apart = np.linalg.norm(held - corners[:, None], axis=2).min(axis=1)
+    apart = np.linalg.norm(held - scene.mesh.points[[0, 5], None], axis=2).min(axis=1)
     assert apart == pytest.approx(0.0, abs=1e-9)
     assert isinstance(select, dict) or len(held) == 2
 
 
-def moved(mesh: Mesh, factor: float = 1.0, shift: float = 0.0) -> Mesh:
-    return replace(mesh, points=factor * mesh.points + shift)
+SHORT = bar(5, 3, 3)
+FLAT = replace(SHORT, tetrahedra=np.vstack([SHORT.tetrahedra, [[0, 1, 2, 2]]]))
 
 
 @pytest.mark.parametrize(
     ("mesh", "fault"),
     [
-        (bar(9, 5, 4), "a mesh of 180 vertices and tetrahedra is no coarser mesh of 180 vertices"),
-        (cloth(5, 5), "25 vertices and triangles is no coarser mesh of 180 vertices and tetra"),
-        (moved(bar(5, 3, 3), 1e-3), "must fill the same space, with the same unit of length"),
-        (moved(bar(5, 3, 3), shift=9.0), "must fill the same space"),
-        (bar(41, 2, 2), "no vertex is near vertex"),
+        (bar(9, 5, 4), "has 180 vertices and tetrahedra, not fewer than 180 vertices"),
+        (cloth(5, 5), "has 25 vertices and triangles, not fewer than 180 vertices and tetrahedra"),
+        (
+            replace(SHORT, points=1e-3 * SHORT.points),
+            "ends 2.* m from the scene's: in another",
+        ),
+        (bar(41, 2, 2), "no vertex of the scene's mesh is near its vertex"),
+        (FLAT, "vertex"),
     ],
-    ids=["as fine", "surface", "millimetres", "elsewhere", "finer along x"],
+    ids=["as fine", "surface", "millimetres", "finer along x", "degenerate"],
 )
 def test_a_mesh_that_is_no_coarser_one_is_refused(mesh, fault):
-    with pytest.raises(SceneError, match=fault) as error:
+    with pytest.raises(PdromError, match=f"scene 'test': the coarser mesh.*{fault}"):
         coarser.on_mesh(solid(), mesh)
-    assert str(error.value).startswith("scene 'test': ")
 
 
-def test_a_faulty_mesh_is_refused_as_one():
-    made = bar(5, 3, 3)
-    flat = replace(made, tetrahedra=np.vstack([made.tetrahedra, [[0, 1, 2, 2]]]))
-    with pytest.raises(MeshError, match="scene 'test': coarser mesh: "):
-        coarser.on_mesh(solid(), flat)
-
-
-@pytest.mark.parametrize("order", [0.6, 1.0, 2.0, 2.9])
+@pytest.mark.parametrize("order", [0.6, 2.9, 0.3, 3.5, -1.0, None])
 def test_the_error_of_a_mesh_is_exact_for_powers_of_its_spacing(order, rng):
+    """Of orders .5 to 3; others, and a body at rest, tell none."""
     moves, error = rng.standard_normal((2, 4, 10, 3))
     moves[0] = error[0] = 0.0
     spacings = [0.1, 0.17, 0.4]
-    runs = [moves + h**order * error for h in spacings]
-    exact = spacings[0] ** order * np.linalg.norm(error) / np.linalg.norm(runs[0])
-    assert coarser.mesh_error(spacings, runs) == pytest.approx(exact, rel=1e-9)
-
-
-@pytest.mark.parametrize("order", [0.3, 3.5, -1.0, None])  # None: at rest
-def test_other_orders_of_convergence_tell_no_error(order, rng):
-    runs = [
-        rng.standard_normal((2, 4, 3)) * (0.0 if order is None else h**order) for h in (1, 2, 4)
-    ]
-    first = np.zeros_like(runs[0])
-    error = rng.standard_normal((4, 3))
-    runs = [first + (0.0 if order is None else h**order) * error for h in (0.1, 0.2, 0.4)]
-    for run in runs:
-        run[0] = 0.0
-    assert coarser.mesh_error([0.1, 0.2, 0.4], runs) is None
+    runs = [moves * 0.0 if order is None else moves + h**order * error for h in spacings]
+    exact = None
+    if order in (0.6, 2.9):
+        exact = spacings[0] ** order * np.linalg.norm(error) / np.linalg.norm(runs[0])
+    assert coarser.mesh_error(spacings, runs) == (exact and pytest.approx(exact))
 
 
 def test_spacings_of_two_meshes_of_a_body_have_the_ratio_of_their_edges():
