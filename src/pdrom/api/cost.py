@@ -164,6 +164,6 @@ def _of_model(scene: Scene, given: Any, number: int) -> Iterator[Setting]:
         loop = model.loop(scene.iterated(ITERATIONS), solver="local_global")
         if isinstance(model.reduced, SubspaceModel):
             with suppress(NotReducibleError):  # Newton's method needs derivatives of every group
-                yield reduced(labels, scene, model.reduced, count)
+                yield reduced(labels, scene, model.reduced, count, newton=count is None)
         elif count:
             yield Setting(labels, *loop)

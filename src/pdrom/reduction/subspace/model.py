@@ -85,10 +85,11 @@ class SubspaceModel:
 
 
 def reduced(
-    labels: dict[str, Any], scene: Scene, model: SubspaceModel, iterations: int | None
+    labels: dict[str, Any], scene: Scene, model: SubspaceModel, count: int | None, newton: bool
 ) -> Setting:
-    """Setting with ``model`` of the mesh of ``scene``; iterations None: converged, by Newton."""
-    loop, start = model.loop(scene.iterated(iterations or ALL), iterations is None)
+    """Setting with ``model`` of the mesh of ``scene`` and ``count`` iterations, local/global or
+    ``newton``; None: until a frame has converged."""
+    loop, start = model.loop(scene.iterated(count or ALL), newton)
     state = partial(reduced_state, scene, model.columns)
     return Setting(labels, loop, start, model.positions, model.output(), state)
 

@@ -8,7 +8,7 @@ Where reduced models are chosen, they and all others run validation motions, too
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import process_time
 from typing import Annotated, Any, Final, Literal
@@ -107,14 +107,21 @@ class ImplicitReference(ConfigModel):
 class ReducedModel(ConfigModel):
     """A reduced model with sampled elements, trained on each number of motions, and how it runs.
 
-    iterations : local/global iterations of a frame, or "converged" (by Newton's method)
+    iterations, newton : numbers of iterations of a frame, local/global or of Newton's method
     """
 
     modes: kit.Modes = 40
     skinning: Annotated[int, Field(ge=0, le=1000)] = 0
     tolerance: kit.Tolerance = 1e-2
     training_motions: Annotated[tuple[Annotated[int, Field(ge=1, le=64)], ...], Field(min_length=1)]
-    iterations: tuple[kit.Count | Literal["converged"], ...] = (5, "converged")
+    iterations: tuple[kit.Count, ...] = (5,)
+    newton: tuple[kit.Count | Literal["converged"], ...] = ("converged",)
+
+    @property
+    def runs(self) -> dict[str, list[int | None]]:
+        """Method -> numbers of iterations; None: converged."""
+        steps = [None if isinstance(count, str) else count for count in self.newton]
+        return {SAMPLED: [*self.iterations], NEWTON: steps}
 
     @property
     def columns(self) -> tuple[int, int]:
@@ -139,7 +146,7 @@ class Comparison(Processes):
 
     stiffness: dict[str, Factors] = Field(default_factory=dict)
     steps: dict[Method, tuple[Steps, ...]] = Field(default_factory=dict)
-    coarser: kit.Parts = kit.PARTS
+    coarser: kit.Parts = (2 / 3, *kit.PARTS)
     work: dict[Method | Literal["converged", "training"], Work] = Field(default_factory=dict)
     models: tuple[ReducedModel, ...] = (ReducedModel(training_motions=(1, 2)),)
     seconds: Annotated[float, Field(gt=0.0, le=1e4)] = 2.0
@@ -186,15 +193,16 @@ COLUMNS = [
 
 @dataclass(frozen=True)
 class Trained:
-    """A reduced model, trained on a number of motions, and the ``iterations`` that it runs with.
+    """A reduced model, trained on a number of motions, and how it runs.
 
     labels : columns of tables that describe it
+    iterations : method -> numbers of iterations; None: converged
     coarse : whether the model is the coarse level of the two-level method
     """
 
     labels: dict[str, object]
     model: SubspaceModel
-    iterations: tuple[int | str, ...] = ()
+    iterations: dict[str, list[int | None]] = field(default_factory=dict)
     coarse: bool = False
 
 
@@ -218,10 +226,10 @@ class Case:
                     labels = {**common, "method": TWO_LEVEL, "iterations": count}
                     loop = TwoLevel(self.scene, substeps, count, own.model)
                     yield Setting(labels, loop, self.scene.initial_state())
-            for iterations in own.iterations:
-                asked = None if isinstance(iterations, str) else iterations
-                labels = {**common, "method": SAMPLED if asked else NEWTON, "iterations": asked}
-                yield reduced(labels, self.scene, own.model, asked)
+            for method, counts in own.iterations.items():
+                for asked in counts:
+                    labels = {**common, "method": method, "iterations": asked}
+                    yield reduced(labels, self.scene, own.model, asked, method == NEWTON)
 
     def _full_order(self) -> Iterator[Setting]:
         for method, window in ACCELERATED.items():
@@ -312,7 +320,7 @@ def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
                     "elements_sampled": model.elements_evaluated(training),
                     "training_residual": model.residual,
                 }  # fmt: skip
-                yield Trained(labels, model, spec.iterations if spec else (), coarse=spec is None)
+                yield Trained(labels, model, spec.runs if spec else {}, coarse=spec is None)
 
 
 def model_of(section: Comparison, method: Method) -> bool:
