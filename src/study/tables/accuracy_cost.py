@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from pdrom.reduction.settings import pareto
+from pdrom.reduction.settings import COARSER, COARSER_ANDERSON, pareto
 from study.artifact import paths
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
@@ -33,7 +33,7 @@ from study.tables.kit.results import (
     with_held_out,
 )
 
-FEWER, COARSER = "fewer-iterations", "coarser-mesh"
+FEWER = "fewer-iterations"
 _POINT = [ERROR, "ms_per_frame"]
 
 
@@ -95,7 +95,7 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     cost = times.fillna({"method": FOM})[[*keys, "ms_per_frame"]]
     errors["mesh_error"] = errors.groupby("scene").mesh_error.transform("max")
     coarser = errors.vertices < errors.groupby("scene").vertices.transform("max")
-    names = np.where(coarser, COARSER, FOM), np.where(coarser, f"{COARSER}-anderson", ANDERSON)
+    names = np.where(coarser, COARSER, FOM), np.where(coarser, COARSER_ANDERSON, ANDERSON)
     errors["method"] = np.where(errors.window > 0, names[1], names[0])
     errors = errors.rename(columns={"error_converged": ERROR, "deformation_converged": DEFORMATION})
     points = errors.merge(cost, on=keys)

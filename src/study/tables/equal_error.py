@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 
 from pdrom.model.held_out import MOTIONS, PLAYBACK
+from pdrom.reduction.settings import pareto
 from study.artifact import paths
 from study.artifact.reads import Every, Recorded, Setting, TableOf
 from study.experiments.alternatives.experiment import CONVERGED, REDUCTIONS, SETTING
 from study.tables import alternatives as runs
-from study.tables.accuracy_cost import pareto
 from study.tables.kit import results
 from study.tables.kit.declaration import (
     Column,

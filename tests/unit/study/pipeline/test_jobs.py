@@ -44,7 +44,7 @@ def test_every_table_finds_what_it_reads_in_the_order_of_the_study():
 
 def test_the_table_of_equal_errors_knows_what_constraints_act_on():
     scenes = {"bar80": "tetrahedra", "cloth_all": "triangles", "spring_oop": "springs"}
-    asked = plan(alternatives={"scenes": dict.fromkeys(scenes, [1])})
+    asked = plan(alternatives={"scenes": {name: [1] for name in scenes}})
     made = {job.artifact.name: job for job in asked.fixed["tables"]}
     assert made["equal_error"].settings["elements"] == scenes
 
