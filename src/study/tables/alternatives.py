@@ -71,7 +71,6 @@ estimated = partial(replace, *shared("reference_error"))  # column of errors of 
         estimated(meaning="estimated error of that motion"),
         estimated(name="implicit_error", meaning="of the converged step, by a much finer solve"),
         estimated(name="implicit_deformation_error", meaning="of its shapes"),
-        number("span_error", "error of the nearest motion in the subspace of a reduced model"),
         *shared("mesh_error"),
         results.DAY,
     ),

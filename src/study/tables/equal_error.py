@@ -15,7 +15,12 @@ from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.reduction.settings import pareto
 from study.artifact import paths
 from study.artifact.reads import Every, Recorded, Setting, TableOf
-from study.experiments.alternatives.experiment import CONVERGED, REDUCTIONS, SETTING
+from study.experiments.alternatives.experiment import (
+    CONVERGED,
+    REDUCTIONS,
+    SETTING,
+    ReducedModel,
+)
 from study.tables import alternatives as runs
 from study.tables.kit import results
 from study.tables.kit.declaration import (
@@ -30,9 +35,8 @@ from study.tables.kit.declaration import (
     timed,
 )
 
-# The fixed settings of `equal_error`: modes (or the nearest number), skinning columns, sampling
-# tolerance, local/global iterations (empty: converged), largest number of training trajectories.
-MODES, SKINNING, TOLERANCE, FIVE, TRAINING = 40, 0, 1e-2, 5, 2
+# The reduced model of `equal_error`; where a recording holds fewer modes, the nearest number.
+FIXED = ReducedModel(training_motions=(1, 2))
 NO_OPPONENTS = (CONVERGED, PLAYBACK, *REDUCTIONS)
 PARTS = REDUCED, COARSER, SAME = "reduced", "coarser mesh", "same mesh"
 OWN = integer("vertices", "vertices of the scene's own mesh")
@@ -89,7 +93,7 @@ def opponent(prefix: str, where: str) -> list[Column]:
 def equal_error(
     rows: pd.DataFrame, times: list[paths.File], elements: Mapping[str, str], record: list[Path]
 ) -> pd.DataFrame:
-    """One row per test trajectory and reduced model with fixed settings (see `MODES`).
+    """One row per test trajectory and reduced model with the settings of `FIXED`.
 
     Opponents are all timed full-order settings that have at most the model's position error over
     all frames in this trajectory. Speed-ups are ratios within a process.
@@ -128,12 +132,13 @@ def _of_this_run(
 
 
 def _fixed(rows: pd.DataFrame) -> Iterator[Any]:
-    """Yield the reduced models among ``rows`` of a case that have the fixed settings."""
+    """Yield the reduced models among ``rows`` of a case that have the settings of `FIXED`."""
     own = rows[rows.method.isin(REDUCTIONS) & rows.error.notna()]
-    own = own[(own.skinning == SKINNING) & np.isclose(own.tolerance, TOLERANCE)]
-    own = own[(own.training_motions <= TRAINING) & own.iterations.fillna(FIVE).eq(FIVE)]
+    own = own[(own.skinning == FIXED.skinning) & np.isclose(own.tolerance, FIXED.tolerance)]
+    own = own[own.training_motions.isin(FIXED.training_motions)]
+    own = own[own.iterations.isna() | own.iterations.isin(FIXED.iterations)]
     for _, same in own.groupby(["method", "training_motions"], sort=False):
-        yield same.loc[(same.k - MODES).abs().idxmin()]
+        yield same.loc[(same.k - FIXED.modes).abs().idxmin()]
 
 
 def _beside(full: pd.DataFrame, model: Any, ms: pd.DataFrame, prefix: str) -> dict[str, Any]:
