@@ -1,5 +1,6 @@
 """TeX tables of the manuscript, each made by a function from tables that its parameters name."""
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from inspect import signature
@@ -244,6 +245,9 @@ def payoff(payoff: pd.DataFrame) -> Rows:
         yield [_name(f"{row.method}{basis}"), *counts, *gains, *errors, *scored]
 
 
+APART = 1.5  # least ratio of the validation errors of two neighbours in the table frontier
+
+
 def _setting(row: Any) -> str:
     """Words for a row of the table frontier: mesh or model, iterations, training."""
     if pd.isna(row.method):
@@ -255,24 +259,28 @@ def _setting(row: Any) -> str:
     skinning = 0 if pd.isna(row.skinning) else row.skinning
     size = _whole(row.k) + (f" + {_whole(skinning)}" if skinning else "")
     trained = f"{_whole(row.training_motions)} trained"
-    return rf"{size} columns, $\tau = {row.tolerance:g}$, {solve}, {trained}"
+    return rf"{size}, $\tau = {row.tolerance:g}$, {solve}, {trained}"
 
 
 def frontier(frontier: pd.DataFrame) -> Rows:
     """Best reduced models and coarser meshes of a scene, chosen on validation trajectories.
 
-    Settings with a validation error above 10 % are left out.
+    Settings with a validation error above 10 %, or hardly below that of the row before, are left
+    out.
     """
     header = ["scene", "setting", "validation", "test (deformation)", "time", "training", "ahead"]
     yield "llrrrrr", header
     shown = frontier[(frontier.part != SAME) & ~(frontier.validation_error > FAILED)]
     for (scene, vertices, _), own in shown.groupby(["scene", "vertices", "part"], sort=False):
-        for place, row in enumerate(own.itertuples()):
+        opening, before = f"{_name(scene)}, {_whole(vertices)}", math.inf
+        for row in own.itertuples():
+            if row.validation_error > before / APART:
+                continue
             tested = f"{_known(row.position_error)} ({_known(row.deformation_error)})"
-            opening = "" if place else f"{_name(scene)}, {_whole(vertices)}"
             first = [opening, _setting(row), _known(row.validation_error), tested]
             training = _known(row.offline_ratio, _rounded)
             yield [*first, _known(row.time_ratio), training, _known(row.ahead)]
+            opening, before = "", row.validation_error
 
 
 def scenes(
