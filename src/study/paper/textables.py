@@ -1,29 +1,28 @@
 """TeX tables of the manuscript, each made by a function from tables that its parameters name."""
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from inspect import signature
 from operator import itemgetter
 from typing import Any
 
 import pandas as pd
 
-from pdrom.model.held_out import MOTIONS, PLAYBACK
+from pdrom.model.held_out import MOTIONS
 from study.artifact.text import escape
-from study.experiments.alternatives.experiment import ACCELERATED
 from study.experiments.error_budget import PARTS
 from study.figures.kit.declaration import declarations
 from study.paper.macros import HIDDEN, format_number
-from study.tables.alternatives import CASE, CURVE
-from study.tables.kit.results import MEASURES, MEDIAN, in_words, over_motions, trained
+from study.tables.equal_error import REDUCED, SAME
+from study.tables.kit.results import FAILED, MEASURES, MEDIAN, over_motions, trained
 
 NONE = "--"
 LEFT = r">{\raggedright\arraybackslash}"
 # Iterator over a table: first (column definitions, header), then the rows; all cells are TeX.
 Rows = Iterator[Any]
 # Tables that may break across pages.
-LONG = ("tab_scenes", "tab_trajectories", "tab_ranks", "tab_local_share")
+LONG = ("tab_scenes", "tab_trajectories", "tab_ranks", "tab_local_share", "tab_frontier")
 FULL = "full"  # value of column position_basis for runs with unreduced positions
 
 
@@ -56,6 +55,11 @@ def _group(group: str) -> str:
 
 def _whole(value: float) -> str:
     return str(int(value))
+
+
+def _rounded(value: float) -> str:
+    """Format the whole number ``value``, rounded to two digits."""
+    return _whole(float(f"{value:.1e}"))
 
 
 def _known(value: Any, form: Callable[[Any], str] = format_number) -> str:
@@ -209,7 +213,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
             f"{_known(row.error_train)} ({_known(row.deformation_train)})",
             f"{_known(row.error_heldout)} ({_known(row.deformation_heldout)})",
             *map(_known, (row.playback_error, row.training_s, row.reduction_s)),
-            "never" if pd.isna(frames) else _whole(float(f"{frames:.1e}")),
+            "never" if pd.isna(frames) else _rounded(frames),
         ]
 
 
@@ -241,50 +245,42 @@ def payoff(payoff: pd.DataFrame) -> Rows:
         yield [_name(f"{row.method}{basis}"), *counts, *gains, *errors, *scored]
 
 
-def pays(winners: pd.DataFrame) -> Rows:
-    """Vertices from which on a reduction is faster; of positions only if both errors differ."""
-    header = ["scene", "against", "error", "measure", "vertices", "plain", "all", "speed-up"]
-    yield "llllrrrrr", [*header, "motions"]
-    before: list[list[str]] = []
-    for _, curve in winners.groupby(CURVE, sort=False):
-        row, smallest, largest = curve.iloc[0], curve.vertices.min(), curve.vertices.max()
-        stiffness = "" if row.stiffness == 1.0 else rf" $\times {row.stiffness:g}$"
-        cells = [
-            _name(row.scene) + stiffness + ("*" if curve.recorded.notna().any() else ""),
-            row.reference,
-            format_number(row.limit),
-            str(smallest) if smallest == largest else f"{smallest} to {largest}",
-            _known(row.from_plain, _whole),
-            _known(row.from_best, _whole),
-            _known(row.speedup, partial(in_words, low=row.speedup_low, high=row.speedup_high)),
-            f"{_known(row.reached, _whole)} of {row.motions}",
-        ]
-        if cells not in before:
-            yield [*cells[:3], row.measure, *cells[3:]]
-        before.append(cells)
+APART = 1.5  # least ratio of the validation errors of two neighbours in the table frontier
 
 
-def training(alternatives: pd.DataFrame) -> Rows:
-    """Errors of the reduction with Anderson acceleration, by the number of its training motions.
+def _setting(row: Any) -> str:
+    """Words for a row of the table frontier: mesh or model, iterations, training."""
+    if pd.isna(row.method):
+        return NONE
+    solve = "converged" if pd.isna(row.iterations) else f"$K = {_whole(row.iterations)}$"
+    solve += ", accelerated" if str(row.method).endswith("anderson") else ""
+    if row.part != REDUCED:
+        return f"{_whole(row.simulated)} vertices, {solve}"
+    skinning = 0 if pd.isna(row.skinning) else row.skinning
+    size = _whole(row.k) + (f" + {_whole(skinning)}" if skinning else "")
+    trained = f"{_whole(row.training_motions)} trained"
+    return rf"{size}, $\tau = {row.tolerance:g}$, {solve}, {trained}"
 
-    For the smallest and largest number, the table also has the time of training over that of a
-    plain frame, and the error of the mass-orthogonal projection of the motion onto the subspace.
+
+def frontier(frontier: pd.DataFrame) -> Rows:
+    """Best reduced models and coarser meshes of a scene, chosen on validation trajectories.
+
+    Settings with a validation error above 10 %, or hardly below that of the row before, are left
+    out.
     """
-    reduced = alternatives[alternatives.method == ACCELERATED]
-    reduced = reduced[reduced.iterations == reduced.iterations.max()]
-    played = alternatives[alternatives.method == PLAYBACK].set_index(CASE).error_implicit
-    counts = sorted(reduced.training_motions.unique())
-    header = ["scene", "vertices", "motion", "playback", *map(_whole, counts)]
-    header += ["nearest: least", "most", "training (frames): least", "most"]
-    yield "lrl" + "r" * (5 + len(counts)), header
-    for case, own in reduced.groupby(CASE, sort=False):
-        own = own[own.k == own.k.max()].set_index("training_motions").sort_index()
-        scene, vertices, stiffness, motion = case
-        stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
-        ends = own.iloc[[0, -1]]
-        numbers = [played[case], *own.error_implicit.reindex(counts), *ends.span_error]
-        numbers += [*ends.offline_ratio]
-        yield [_name(scene) + stiff, str(vertices), motion, *map(_known, numbers)]
+    header = ["scene", "setting", "validation", "test (deformation)", "time", "training", "ahead"]
+    yield "llrrrrr", header
+    shown = frontier[(frontier.part != SAME) & ~(frontier.validation_error > FAILED)]
+    for (scene, vertices, _), own in shown.groupby(["scene", "vertices", "part"], sort=False):
+        opening, before = f"{_name(scene)}, {_whole(vertices)}", math.inf
+        for row in own.itertuples():
+            if row.validation_error > before / APART:
+                continue
+            tested = f"{_known(row.position_error)} ({_known(row.deformation_error)})"
+            first = [opening, _setting(row), _known(row.validation_error), tested]
+            training = _known(row.offline_ratio, _rounded)
+            yield [*first, _known(row.time_ratio), training, _known(row.ahead)]
+            opening, before = "", row.validation_error
 
 
 def scenes(
@@ -413,7 +409,7 @@ TEX_TABLES: dict[str, Callable[..., Rows]] = {
     f"tab_{make.__name__}": make
     for make in (
         claims, claims_in_full, scenes, methods, ranks, reruns, local_share, stability, iterations,
-        positions, break_even, speedups, payoff, pays, training, trajectories, error_budget,
+        positions, break_even, speedups, payoff, frontier, trajectories, error_budget,
     )
 }  # fmt: skip
 

@@ -36,7 +36,7 @@ from study.tables.kit.results import recordable
 
 COSTS = Path("config/reference/job_costs.csv")
 COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]
-KEPT = ("alternatives", "winners")
+KEPT = ("alternatives", "equal_error", "frontier")
 LONG, MADE = "config/extended.yaml", Path("config/reference/recorded/made.csv")
 
 

@@ -219,6 +219,13 @@ def _scene(study: Study, name: str) -> dict[str, Any]:
     }
 
 
+def _elements(scene: SceneConfig) -> str:
+    """Return what the constraints of ``scene`` act on; if on several, the largest elements."""
+    cells = {EFFECTS.load(group).cells for group in scene.groups}
+    kinds = {"tetrahedron": "tetrahedra", "triangle": "triangles"}
+    return next((words for cell, words in kinds.items() if cell in cells), "springs")
+
+
 DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     # recorded rows are about scenes of the full study
     "recorded": lambda study, _: study.settings.recorded and not study.is_alone,
@@ -231,6 +238,9 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "every_method": lambda study, labels: study.every_method,
     "scene_time_steps": lambda study, _: {k: v.time_step for k, v in study.scenes.items()},
     "scene_iterations": lambda study, _: {k: v.iterations for k, v in study.scenes.items()},
+    "compared_elements": lambda study, _: {
+        name: _elements(study.scene(name)) for name in study.settings.alternatives.scenes
+    },
     "usual_bases": _usual_bases,
     "own_ladder": lambda study, labels: (
         study.settings.ladder if _holds(study, paths.LADDER, labels) else None

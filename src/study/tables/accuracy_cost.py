@@ -2,7 +2,8 @@
 
 Errors are taken against the run with converged frames (K -> infinity local/global iterations).
 Method ``full`` without a position subspace is the full-order run with the scene's own K, ``fom``
-one with another K, ``fom-anderson`` one with Anderson acceleration.
+one with another K, ``fom-anderson`` one with Anderson acceleration, ``coarser-mesh`` and
+``coarser-mesh-anderson`` are the same on a coarser mesh.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from pdrom.reduction.settings import pareto
+from pdrom.reduction.settings import COARSER, COARSER_ANDERSON, pareto
 from study.artifact import paths
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
@@ -42,10 +43,11 @@ _POINT = [ERROR, "ms_per_frame"]
     columns=(
         *shared("scene group method position_basis k r"),
         integer("iterations", "local/global iterations of a frame"),
+        integer("vertices", "vertices of the mesh that is simulated"),
         *shared("relative_error_within_horizon deformation_error ms_per_frame"),
         timed(flag("pareto", "no point of the scene is as good in error and time, better in one")),
         REFERENCE,
-        *shared("reference_error reference_deformation_error"),
+        *shared("reference_error reference_deformation_error mesh_error"),
         *results.COLUMNS,
         *shared("velocity_error energy_drift"),
     ),
@@ -68,11 +70,15 @@ def accuracy_cost(
     Velocities and energies are compared with the full-order run of the scene's own iterations.
     """
     times = results.timings_in_one_time(files["timings"], frame_times)
-    sweep = _sweep(joined(files["sweeps"]), times[times.implementation == "compiled"])
+    times = times[times.implementation == "compiled"]
+    sweep = _sweep(joined(files["sweeps"]), times)
     own = sweep[(sweep.method == FOM) & (sweep.iterations == sweep.scene.map(iterations))]
+    sweep = sweep.assign(mesh_error=None)
     reduced = against_converged(reruns)
     points = trained(reduced).dropna(subset=_POINT)
-    points = with_held_out(points.assign(iterations=points.scene.map(iterations)), reduced)
+    vertices = times.groupby("scene").vertices.max()
+    sizes = {"iterations": points.scene.map(iterations), "vertices": points.scene.map(vertices)}
+    points = with_held_out(points.assign(**sizes, mesh_error=None), reduced)
     known = trained(reruns).drop_duplicates("scene")[["scene", *OWN_ERRORS]]
     own, sweep = (full.merge(known, "left", "scene") for full in (own.assign(method="full"), sweep))
     parts = [part for part in (own, points, sweep) if len(part)]
@@ -84,13 +90,15 @@ def accuracy_cost(
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
-    """Rows of full-order runs with each number of iterations, that of the scene among them."""
-    full = times[times.method.isna() | times.method.isin([FOM, ANDERSON])]
-    cost = full[["scene", "method", "iterations", "ms_per_frame"]]
-    cost = cost.fillna({"method": FOM})
-    errors["method"] = (errors.window > 0).map({True: ANDERSON, False: FOM})
+    """Rows of full-order runs with each number of iterations, on each mesh of the scene."""
+    keys = ["scene", "method", "iterations", "vertices"]
+    cost = times.fillna({"method": FOM})[[*keys, "ms_per_frame"]]
+    errors["mesh_error"] = errors.groupby("scene").mesh_error.transform("max")
+    coarser = errors.vertices < errors.groupby("scene").vertices.transform("max")
+    names = np.where(coarser, COARSER, FOM), np.where(coarser, COARSER_ANDERSON, ANDERSON)
+    errors["method"] = np.where(errors.window > 0, names[1], names[0])
     errors = errors.rename(columns={"error_converged": ERROR, "deformation_converged": DEFORMATION})
-    points = errors.merge(cost, on=["scene", "method", "iterations"])
+    points = errors.merge(cost, on=keys)
     return points.assign(position_basis="full", k=None, r=None).dropna(subset=_POINT)
 
 
@@ -187,29 +195,29 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
 
     For each scene and group, a size is chosen in the training motion (that of the fastest accurate
     run, or else of the most accurate run) and evaluated on held-out motions. Groups with at most
-    `SHARE` of all forces in a scene are left out. The first row is the full order with fewer
-    iterations (from ``points``); as it needs no training, its held-out columns are empty. Errors
-    are those against the converged run; motions in which it is not known well enough are left out.
-    Speed-ups are relative to the scene's own full-order run.
+    `SHARE` of all forces in a scene are left out. The first rows are the full order with fewer
+    iterations and on coarser meshes (from ``points``); as they need no training, their
+    held-out columns are empty. Errors are those against the converged run; motions in which it
+    is not known well enough are left out. Speed-ups are relative to the scene's own full-order run.
     """
     shares = effects.set_index(["scene", "effect"]).force_share
     weak = shares.index[shares <= SHARE]
     found = []
     for measure in MEASURES:
         judged = judged_by(against_converged(reruns), measure, FAILED)
-        fewer = judged_by(_fewer(points), measure, FAILED)
-        found += [{"measure": measure, **row} for row in _summaries(judged, fewer, weak)]
+        whole = judged_by(_full_order(points), measure, FAILED)
+        found += [{"measure": measure, **row} for row in _summaries(judged, whole, weak)]
     return pd.DataFrame(found).assign(reference=CONVERGED)
 
 
 def _summaries(
-    reruns: pd.DataFrame, fewer: pd.DataFrame, weak: pd.MultiIndex
+    reruns: pd.DataFrame, whole: pd.DataFrame, weak: pd.MultiIndex
 ) -> Iterator[dict[str, object]]:
-    """Yield a row for each method in ``fewer`` and ``reruns``, without groups that are ``weak``."""
+    """Yield a row for each method in ``whole`` and ``reruns``, without groups that are ``weak``."""
     runs = trained(reruns)
     runs = runs[runs.speedup.notna() & runs.max_extent.notna()]
     runs = runs[~pd.MultiIndex.from_frame(runs[["scene", "group"]]).isin(weak)]
-    runs = pd.concat([fewer, with_held_out(runs, reruns)], ignore_index=True)
+    runs = pd.concat([whole, with_held_out(runs, reruns)], ignore_index=True)
     for (basis, method), own in runs.groupby(["position_basis", "method"], sort=False):
         accurate = own[own[ERROR] <= FAILED]
         fastest = accurate.sort_values("speedup").groupby(["scene", "group"]).tail(1)
@@ -239,11 +247,13 @@ def _summaries(
         }
 
 
-def _fewer(points: pd.DataFrame) -> pd.DataFrame:
-    """Runs of ``points`` with fewer iterations than the scene's, and their speed-ups over it."""
+def _full_order(points: pd.DataFrame) -> pd.DataFrame:
+    """Runs of ``points`` with fewer iterations or coarser meshes, and their speed-ups."""
     full = points[(points.method == "full") & (points.position_basis == "full")]
     full = full.set_index("scene")
     fewer = points[points.method == FOM]
     fewer = fewer[fewer.iterations < fewer.scene.map(full.iterations)]
-    speedup = fewer.scene.map(full.ms_per_frame) / fewer.ms_per_frame
-    return fewer.assign(group="all", method=FEWER, speedup=speedup)
+    coarser = points[points.method.str.startswith(COARSER)]
+    found = pd.concat([fewer.assign(method=FEWER), coarser.assign(method=COARSER)])
+    speedup = found.scene.map(full.ms_per_frame) / found.ms_per_frame
+    return found.assign(group="all", speedup=speedup)

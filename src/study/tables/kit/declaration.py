@@ -180,6 +180,12 @@ _SHARED = (
         "reference_deformation_error", "its deformation error", tolerance=REFERENCE_ERROR_TOLERANCE
     ),
     number(
+        "mesh_error",
+        "estimated error of the scene's own mesh, by Richardson's rule from three meshes, relative "
+        "to the motion; empty if the observed order is not 0.5 to 3",
+        tolerance=REFERENCE_ERROR_TOLERANCE,
+    ),
+    number(
         "playback_error",
         "error of playback before the horizon: of the recorded training motion in place of the run",
     ),

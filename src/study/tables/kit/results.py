@@ -73,7 +73,7 @@ def with_recorded(rows: pd.DataFrame, record: list[Path], known: Sequence[Column
     others = read_table(record[0], result=False).reindex(columns=recordable(known))
     if rows.empty:
         return others.reindex(columns=[column.name for column in known])
-    keys = ["scene", "stiffness", "vertices"]
+    keys = [name for name in ("scene", "factor", "stiffness") if name in rows]
     own = pd.MultiIndex.from_frame(rows[keys].astype(object))
     others = others[~pd.MultiIndex.from_frame(others[keys].astype(object)).isin(own)]
     return pd.concat([rows.assign(recorded=None), others], ignore_index=True)

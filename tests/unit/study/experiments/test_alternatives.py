@@ -1,12 +1,11 @@
 """Experiment alternatives: errors against both references, and the tables of its rows."""
 
-import numpy as np
 import pandas as pd
 import pytest
 
-from builders import GRAVITY, LEFT, frame, make_scene
+from builders import GRAVITY, LEFT, make_scene
 from pdrom.core.errors import ConfigurationError
-from pdrom.core.store import read_table, write_table
+from pdrom.core.store import read_table
 from pdrom.core.yamlfile import validate
 from pdrom.model.held_out import MOTIONS
 from places import ROOT
@@ -15,7 +14,7 @@ from study.artifact.reads import RECORD
 from study.experiments.alternatives import experiment
 from study.experiments.alternatives.experiment import Alternatives, Comparison
 from study.tables import declared
-from study.tables.alternatives import _pays, alternatives, winners
+from study.tables.alternatives import alternatives
 from study.tables.kit.results import with_recorded
 
 EFFECTS = (GRAVITY, LEFT, {"effect": "spring", "weight": 1e4})
@@ -105,66 +104,6 @@ def test_a_finer_mesh_has_the_mass_of_the_scene():
     assert [getattr(effect, "weight", None) for effect in finer.effects] == [None, None, 1e5]
 
 
-def test_tables_of_the_rows(written, table):
-    times = [written[1]]
-    found = winners(table, times, [1.0, 1e-3, 1e-12], [])
-    counts = found.groupby(["reference", "measure"]).size()
-    assert counts["implicit", "position"] >= counts["implicit", "both"] >= 2 * 3
-    assert counts["continuous", "position"] == 2 * 3 * 2
-    assert len(winners(alternatives([], [], []), [], [0.1], [])) == 0
-    strict = found[(found.limit == 1e-3) & (found.reference == "continuous")]
-    assert (strict[strict.motion == "heldout"].method == "explicit").all()
-    assert (found.motions == 3).all()
-    assert 1e-12 not in set(found.limit)
-    assert not found.method.isin(experiment.REDUCTIONS).any()
-
-
-def test_recorded_rows_of_other_meshes_are_beside_those_of_the_run(written, table, tmp_path):
-    parts, times = written
-    record = tmp_path / "record.csv"
-    finer = table.assign(recorded="2026-01-02", vertices=120)
-    pd.concat([table.assign(recorded="2026-01-02"), finer]).to_csv(record, index=False)
-    both = alternatives([parts], [times], [record])
-    assert both.groupby("vertices").recorded.count().to_dict() == {30: 0, 120: len(table)}
-    # what is recorded of the times is a table as well, which is not made again
-    assert set(winners(both, [times], [0.1], []).vertices) == {30}
-
-
-def test_winners_are_the_cheapest_that_reach_the_error(tmp_path):
-    labels = {"scene": "s", "factor": 1.0, "stiffness": 1.0, "substeps": 1, "iterations": 1}
-    labels["k"] = np.nan
-    rows = frame(
-        "method ms_per_frame error_implicit deformation_error", ("a", 1.0, 0.05, 0.05),
-        ("b", 2.0, 0.005, 0.02), ("ecsw", 0.5, 0.02, 0.2), ("c", 0.1, np.nan, np.nan),
-        ("converged", np.nan, 0.0, 0.0),
-    ).assign(
-        **labels, training_motions=lambda t: t.method.map({"ecsw": 4}), offline_s=3.0, vertices=9,
-        vertices_ms=0.1, motion="heldout", error_continuous=lambda t: t.error_implicit,
-        reference_error=1e-2, recorded=None, time_ratio=2.0, vertices_ratio=0.2,
-        implicit_error=3e-3, implicit_deformation_error=1e-2,
-    )  # fmt: skip
-    # speed-ups are ratios within a process; in the second one both methods are slower
-    ms = rows.dropna(subset="ms_per_frame").drop(columns="error_implicit")
-    slow = ms.assign(process=2, ms_per_frame=4.0 * ms.ms_per_frame)
-    measured = pd.concat([ms.assign(process=1), slow])[experiment.TIME_COLUMNS]
-    write_table(measured, tmp_path / "times.csv")
-    files = [File(str(tmp_path / "times.csv"), {})]
-    found = winners(rows, files, [0.1, 0.01], []).set_index(["reference", "measure", "limit"])
-    loose, strict = (found.loc["implicit", "position", limit] for limit in (0.1, 0.01))
-    assert [loose.method, *loose.filter(like="reduced_speedup")] == ["a", 2.0, 2.0, 2.0]
-    assert (loose.reduced_training_motions, loose.reduced_pays_after) == (4, 6000.0)
-    assert (strict.method, strict.reduced_error) == ("b", 0.02)
-    # no verdict where a third of the limit is below an error of the reference itself
-    assert found.reduced_time_ratio.notna().tolist() == [False, True, True, False]
-    # the reduction misses the shapes; in a rigid motion positions decide
-    shown = found[["method", "error", "reduced_error"]].loc["implicit", "both", 0.1]
-    assert shown.tolist() == ["a", 0.05, 0.2]
-    rigid = rows.assign(deformation_error=np.nan, implicit_deformation_error=np.nan)
-    assert winners(rigid, files, [0.1], []).reduced_time_ratio.tolist() == [2.0, 2.0, 2.0]
-    found = winners(rigid.assign(implicit_error=np.nan), files, [0.1], [])
-    assert found.reference.tolist() == ["continuous"]
-
-
 @pytest.mark.parametrize("name", [n for n, t in declared().items() if "recorded" in t.column_names])
 def test_a_table_has_no_times_of_two_machines(name, tmp_path):
     columns = declared()[name].columns
@@ -202,28 +141,3 @@ def test_steps_that_cost_too_much_are_left_out_and_weights_vary_on_the_own_mesh_
     assert [n for n in asked.training_motions if asked.affords("training", 10 * n)] == [1, 2, 4]
     assert asked.factors("s", 1.0) == (1.0, 100.0)
     assert asked.factors("s", 2.0) == asked.factors("other", 1.0) == (1.0,)
-
-
-def test_the_size_from_which_a_reduction_pays():
-    rows = frame(
-        "vertices plain_speedup reduced_speedup reduced_speedup_low reduced_speedup_high",
-        (100, 2.0, 0.25, 0.2, 0.3), (400, 8.0, 0.5, 0.4, 0.6), (10_000, 200.0, 50.0, 40.0, 60.0),
-    )  # fmt: skip
-
-    def pays(own: pd.DataFrame, *others: pd.DataFrame) -> dict[str, object]:
-        slower = own.assign(reduced_speedup=0.9 * own.reduced_speedup)
-        slower.reduced_speedup_low *= 0.1
-        return _pays(pd.concat([own, slower, *others]))
-
-    usual = pays(rows)
-    assert (usual["from_plain"], usual["from_best"]) == (100, 10_000)
-    assert (usual["speedup"], usual["speedup_low"], usual["speedup_high"]) == (47.5, 4.0, 60.0)
-    assert (usual["motions"], usual["reached"]) == (2, 2)
-    strict = pays(rows.assign(reduced_speedup=[0.5, np.nan, 3.0], plain_speedup=np.nan))
-    assert (strict["from_plain"], strict["from_best"]) == (None, 10_000)
-    never = pays(rows.assign(reduced_speedup=[3.0, 2.0, np.nan]))
-    assert (never["from_best"], never["reached"]) == (None, 0)
-    always = rows.assign(reduced_speedup=[2.0, 2.0, 2.0])
-    assert pays(always)["from_best"] == 100
-    # a reduction that misses the error in one motion does not pay
-    assert pays(always, always.assign(reduced_speedup=np.nan))["from_best"] is None

@@ -37,9 +37,16 @@ def test_every_table_finds_what_it_reads_in_the_order_of_the_study():
     assert made["sensitivity"].inputs == {
         "parts": ["out/sensitivity/spring_oop.csv", "out/sensitivity/strain_oop.csv"]
     }
-    assert made["winners"].inputs["rows"] == "out/tables/alternatives.csv"
+    assert made["equal_error"].inputs["rows"] == "out/tables/alternatives.csv"
     assert made["online"].inputs["parts"] == []
     assert made["claims"].inputs["rules"] == "config/claims.yaml"
+
+
+def test_the_table_of_equal_errors_knows_what_constraints_act_on():
+    scenes = {"bar80": "tetrahedra", "cloth_all": "triangles", "spring_oop": "springs"}
+    asked = plan(alternatives={"scenes": {name: [1] for name in scenes}})
+    made = {job.artifact.name: job for job in asked.fixed["tables"]}
+    assert made["equal_error"].settings["elements"] == scenes
 
 
 def test_an_own_study_plans_only_what_its_own_scenes_have():
@@ -56,8 +63,8 @@ def test_an_own_study_plans_only_what_its_own_scenes_have():
     assert not [path for job in jobs for path in job.files if "recorded" in path]
     named = {path.rpartition("/")[2].partition(".")[0] for path in own.own_files}
     about_others = {
-        "alternatives", "winners", "scaling", "ladder", "online", "speedups", "claims",
-        "tab_claims", "cases", "live", "strain_runs", "noise",
+        "alternatives", "equal_error", "frontier", "scaling", "ladder", "online", "speedups",
+        "claims", "tab_claims", "cases", "live", "strain_runs", "noise",
     }  # fmt: skip
     assert about_others & named == set()
     assert {"spring_runs", "bar_runs", "error_against_gain", "payoff", "tab_reruns"} <= named

@@ -213,13 +213,16 @@ def test_contributions_are_judged_before_the_horizon_and_bring_their_times(tmp_p
     assert pd.isna(by.ms_per_frame[("b", "kick")])
 
 
-def test_fewer_iterations_are_the_first_opponent_and_groups_without_force_do_not_count():
+def test_the_full_order_is_the_first_opponent_and_groups_without_force_do_not_count():
     fewer = [("a", 2, 0.2, 1.0), ("a", 5, 0.05, 2.0), ("b", 2, 0.3, 1.0), ("b", 10, 0.01, 4.0)]
     early = [(scene, "fom", "full", *rest) for scene, *rest in fewer]
+    early += [("a", "coarser-mesh", "full", 20, 0.05, 3.0)]
+    early += [("a", "coarser-mesh-anderson", "full", 5, 0.08, 1.5)]
     early += [(scene, "full", "full", 10, 0.01, ms) for scene, ms in (("a", 6.0), ("b", 4.0))]
     reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
     shares = [("a", "spring", 1e-3), ("b", "spring", 2e-3)]  # the former counts for nothing
-    first, own = paid(reruns, *early, shares=shares).itertuples()
+    first, second, own = paid(reruns, *early, shares=shares).itertuples()
     assert (first.method, first.scenes, first.accurate) == ("fewer-iterations", 2, 1)
     assert (first.pays, first.best_speedup, first.heldout) == (1, 3.0, 0)
+    assert (second.method, second.scenes, second.best_speedup) == ("coarser-mesh", 1, 4.0)
     assert own.scenes == 1

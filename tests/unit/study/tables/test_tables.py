@@ -154,6 +154,8 @@ def files(tmp_path) -> dict[str, object]:
             time("a", ms=5.0, r=10, **local), time("a", ms=2.5, method="fom", iterations=2),
             time("a", ms=24.0, method="fom", iterations=40),
             time("a", ms=9.0, method="fom-anderson", iterations=10),
+            time("a", ms=2.0, method="coarser-mesh", iterations=10, vertices=4),
+            time("a", ms=3.0, method="coarser-mesh-anderson", iterations=10, vertices=4),
         ),
         written(
             tmp_path / "timing_b.csv", time("b", ms=10.0), time("b", ms=2.0, r=6, **local),
@@ -280,11 +282,15 @@ def test_pareto_keeps_what_nothing_beats(points):
 
 
 def sweep(folder, **changes) -> File:
-    """Scene a with K = 2, 10 (its own) and 40, all or with ``changes``."""
+    """Scene a with K = 2, 10 (its own) and 40, and a coarser mesh, all or with ``changes``."""
     rows = [
-        {"iterations": k, "window": w, "error_converged": e, "deformation_converged": 3.0 * e}
-        for k, w, e in ((2, 0, 0.4), (10, 0, 0.1), (40, 0, 0.02), (10, 5, 0.01))
-    ]
+        {"iterations": k, "window": w, "vertices": n, "mesh_error": m,
+         "error_converged": e, "deformation_converged": 3.0 * e}
+        for k, w, e, n, m in (
+            (2, 0, 0.4, 9, None), (10, 0, 0.1, 9, 0.05), (40, 0, 0.02, 9, None),
+            (10, 5, 0.01, 9, None), (10, 0, 0.5, 4, None), (10, 5, 0.5, 4, None),
+        )
+    ]  # fmt: skip
     return written(folder / "sweep.csv", *({"scene": "a", "frames": 2} | r | changes for r in rows))
 
 
@@ -297,24 +303,27 @@ def points(files, runs, other) -> pd.DataFrame:
 def test_accuracy_cost_compares_all_runs_with_the_converged_one(files, tmp_path):
     """The run of the scene's iterations is there twice; 40 iterations lose to acceleration."""
     table = points(files, reduced_reruns(**files), sweep(tmp_path))
-    columns = ["scene", "method", "iterations", "ms_per_frame", "pareto"]
+    columns = ["scene", "method", "iterations", "vertices", "ms_per_frame", "pareto"]
     assert list(table[columns].itertuples(index=False, name=None)) == [
-        ("a", "full", 10, 8.0, True), ("a", "deim", 10, 4.0, True), ("a", "fom", 2, 2.5, True),
-        ("a", "fom", 10, 8.0, True), ("a", "fom", 40, 24.0, False),
-        ("a", "fom-anderson", 10, 9.0, True), ("b", "deim", 20, 2.0, True),
-        ("b", "full", 20, 1.0, True), ("b", "ecsw-1e-02", 20, 0.5, True),
+        ("a", "full", 10, 9, 8.0, True), ("a", "deim", 10, 9, 4.0, True),
+        ("a", "fom", 2, 9, 2.5, True), ("a", "fom", 10, 9, 8.0, True),
+        ("a", "fom", 40, 9, 24.0, False), ("a", "fom-anderson", 10, 9, 9.0, True),
+        ("a", "coarser-mesh", 10, 4, 2.0, True), ("a", "coarser-mesh-anderson", 10, 4, 3.0, False),
+        ("b", "deim", 20, 9, 2.0, True), ("b", "full", 20, 9, 1.0, True),
+        ("b", "ecsw-1e-02", 20, 9, 0.5, True),
     ]  # fmt: skip
+    assert table.mesh_error.fillna(0.0).tolist() == [0.05] + [0.0] * 10
     reduced = 2.0 * error([0.1, 0.2], 2)
     found = table[table.scene == "a"]
     positions, shapes = found.relative_error_within_horizon, found.deformation_error
-    assert positions.tolist() == pytest.approx([0.1, reduced, 0.4, 0.1, 0.02, 0.01])
-    assert shapes.tolist() == pytest.approx([0.3, reduced / 2.0, 1.2, 0.3, 0.06, 0.03])
-    assert found.reference_error.tolist() == [0.01] * 6
+    assert positions.tolist() == pytest.approx([0.1, reduced, 0.4, 0.1, 0.02, 0.01, 0.5, 0.5])
+    assert shapes.tolist() == pytest.approx([0.3, reduced / 2.0, 1.2, 0.3, 0.06, 0.03, 1.5, 1.5])
+    assert found.reference_error.tolist() == [0.01] * 8
 
 
 def test_without_a_converged_run_there_is_no_point(files, tmp_path):
     runs, none = reduced_reruns(**files), sweep(tmp_path, error_converged=None)
-    assert not {"fom", "fom-anderson"} & set(points(files, runs, none).method)
+    assert set(points(files, runs, none).method) == {"deim", "full", "ecsw-1e-02"}
     assert points(files, runs.assign(error_converged=None), none).empty
 
 

@@ -63,7 +63,7 @@ def not_made_again(monkeypatch):
 
 @pytest.mark.usefixtures("not_made_again")
 def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject, capsys):
-    reference = folder_of(RESULTS) / "winners.csv"
+    reference = folder_of(RESULTS) / "error_budget.csv"
     kept = reference.read_bytes()
     for path in (TABLE.at(RESULTS, name="stability"), f"{RESULTS}/figures/ladder.png", reference):
         Path(path).unlink()
@@ -71,7 +71,7 @@ def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject
     reference.write_bytes(kept)
     assert status == Status.MISSING
     assert not PAGE.exists()
-    assert "table winners: no reference, run verify --update" in printed
+    assert "table error_budget: no reference, run verify --update" in printed
     for line, command in (
         ("table stability", "./reproduce --configfile config/tiny.yaml -- stability"),
         ("figure stability_map: not there", ""),

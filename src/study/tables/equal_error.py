@@ -1,0 +1,244 @@
+"""Reduced models beside the fastest full-order settings that are at least as accurate.
+
+A setting is a method with its numbers; the full order also runs on coarser meshes.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pdrom.model.held_out import MOTIONS, PLAYBACK
+from pdrom.reduction.settings import pareto
+from study.artifact import paths
+from study.artifact.reads import Every, Recorded, Setting, TableOf
+from study.experiments.alternatives.experiment import (
+    CONVERGED,
+    REDUCTIONS,
+    SETTING,
+    ReducedModel,
+)
+from study.tables import alternatives as runs
+from study.tables.kit import results
+from study.tables.kit.declaration import (
+    Column,
+    flag,
+    integer,
+    interval,
+    number,
+    shared,
+    table,
+    text,
+    timed,
+)
+
+# The reduced model of `equal_error`; where a recording holds fewer modes, the nearest number.
+FIXED = ReducedModel(training_motions=(1, 2))
+NO_OPPONENTS = (CONVERGED, PLAYBACK, *REDUCTIONS)
+PARTS = REDUCED, COARSER, SAME = "reduced", "coarser mesh", "same mesh"
+OWN = integer("vertices", "vertices of the scene's own mesh")
+
+
+def opponent(prefix: str, where: str) -> list[Column]:
+    """Columns, named by ``prefix``, of the fastest full-order setting and the speed-up over it."""
+    made = [
+        text("method", f"fastest full-order setting {where} with at most this position error"),
+        *([integer("vertices", "vertices of its mesh")] if prefix == COARSER[:7] else []),
+        integer("substeps", "its steps of a frame"),
+        integer("iterations", "its iterations of each"),
+        number("error", "its position error"),
+        number("speedup", "its time over that of the reduced model in a process, median"),
+        *interval("speedup_low speedup_high"),
+        flag("reached", "a setting is as accurate; otherwise the most accurate one is taken"),
+    ]
+    return [timed(replace(column, name=f"{prefix}_{column.name}")) for column in made]
+
+
+@table(
+    title="Speed-ups over full-order settings that are at least as accurate",
+    columns=(
+        *shared("scene"),
+        runs.FACTOR,
+        OWN,
+        runs.STIFFNESS,
+        runs.MOTION,
+        text("elements", "what the scene's constraints act on: springs, triangles or tetrahedra"),
+        text("method", "reduced model: ecsw with few iterations, ecsw-newton to a tolerance"),
+        runs.ITERATIONS,
+        runs.TRAINING,
+        *shared("k"),
+        number("position_error", "of all frames, against the converged step; inf if it blew up"),
+        *shared("deformation_error"),
+        runs.estimated(name="implicit_error", meaning="position error of the converged step"),
+        flag("known", "which is at most a third of the position error", compared="error"),
+        timed(number("time_ratio", runs.RATIO)),
+        timed(number("vertices_ratio", runs.VERTICES_RATIO)),
+        timed(number("offline_ratio", runs.OFFLINE_RATIO)),
+        *shared("mesh_error"),
+        *opponent("same", "on the same mesh"),
+        *opponent("coarser", "on the same or a coarser mesh"),
+        timed(number("pays_after", "frames after which it has paid off its training beside that")),
+        results.DAY,
+    ),
+    reads={
+        "rows": TableOf("alternatives"),
+        "times": Every(paths.ALTERNATIVE_TIMES),
+        "elements": Setting("compared_elements"),
+        "record": Recorded("equal_error"),
+    },
+)
+def equal_error(
+    rows: pd.DataFrame, times: list[paths.File], elements: Mapping[str, str], record: list[Path]
+) -> pd.DataFrame:
+    """One row per test trajectory and reduced model with the settings of `FIXED`.
+
+    Opponents are all timed full-order settings that have at most the model's position error over
+    all frames in this trajectory. Speed-ups are ratios within a process.
+    """
+    rows, ms, _ = _of_this_run(rows, times)
+    found = []
+    for labels, case in rows.groupby(runs.CASE, sort=False):
+        scene, *_, motion = labels
+        vertices, measured = case.vertices.max(), case[case.ms_per_frame.notna()]
+        own = case[(case.method == CONVERGED) & (case.vertices == vertices)]
+        full = measured[~measured.method.isin(NO_OPPONENTS)].dropna(subset="error_implicit")
+        for model in _fixed(measured) if motion in MOTIONS and len(full) else ():
+            row = {name: model[name] for name in equal_error.column_names if name in model}
+            row |= {
+                "vertices": vertices, "elements": elements[scene],
+                "position_error": model.error, "mesh_error": own.mesh_error.max(),
+                "known": model.implicit_error <= results.THIRD * model.error,
+            }  # fmt: skip
+            row |= _beside(full[full.vertices == vertices], model, ms, "same")
+            row |= _beside(full, model, ms, "coarser")  # also replaces "pays_after"
+            found.append(row)
+    made = pd.DataFrame(found, columns=equal_error.column_names)
+    return results.with_recorded(made, record, equal_error.columns)
+
+
+def _of_this_run(
+    rows: pd.DataFrame, times: list[paths.File]
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """`alternatives.beside` for rows of this run; errors of runs that blew up are infinite."""
+    rows = rows[rows.recorded.isna()]
+    if rows.empty:
+        return rows, pd.DataFrame(), pd.DataFrame()
+    blown = ~rows.finite.astype(bool)
+    rows = rows.assign(error=rows.error_implicit.mask(blown, np.inf))
+    return runs.beside(rows, results.joined(times))
+
+
+def _fixed(rows: pd.DataFrame) -> Iterator[Any]:
+    """Yield the reduced models among ``rows`` of a case that have the settings of `FIXED`."""
+    own = rows[rows.method.isin(REDUCTIONS) & rows.error.notna()]
+    own = own[(own.skinning == FIXED.skinning) & np.isclose(own.tolerance, FIXED.tolerance)]
+    own = own[own.training_motions.isin(FIXED.training_motions)]
+    own = own[own.iterations.isna() | own.iterations.isin(FIXED.iterations)]
+    for _, same in own.groupby(["method", "training_motions"], sort=False):
+        yield same.loc[(same.k - FIXED.modes).abs().idxmin()]
+
+
+def _beside(full: pd.DataFrame, model: Any, ms: pd.DataFrame, prefix: str) -> dict[str, Any]:
+    """Values of the columns `opponent`, chosen from settings ``full``; ``ms`` are all times."""
+    if full.empty:
+        return {}
+    able = full[full.error_implicit <= model.error]
+    best = full.loc[able.ms_per_frame.idxmin() if len(able) else full.error_implicit.idxmin()]
+    ratios = (ms.loc[best.name] / ms.loc[model.name]).astype(float).dropna()
+    made = dict(best[["method", "vertices", "substeps", "iterations"]])
+    made |= {"error": best.error_implicit, "reached": len(able) > 0}
+    ends = ("speedup", "speedup_low", "speedup_high")
+    made |= zip(ends, results.median_interval(ratios), strict=True)
+    saved = best.time_ratio - model.time_ratio
+    after = model.offline_ratio / saved if saved > 0.0 else None
+    return {f"{prefix}_{key}": value for key, value in made.items()} | {"pays_after": after}
+
+
+@table(
+    title="The best settings of a scene, chosen on validation trajectories",
+    columns=(
+        *shared("scene"),
+        runs.FACTOR,
+        OWN,
+        text("part", f"settings that the row is the best of, one of: {', '.join(PARTS)}"),
+        *map(
+            timed,
+            (
+                text("method", "how a frame is solved, see alternatives"),
+                integer("simulated", "vertices of the mesh that is simulated"),
+                runs.ITERATIONS,
+                *shared("k"),
+                integer("skinning", "skinning columns beside its modes"),
+                number("tolerance", "sampling tolerance of its elements"),
+                runs.TRAINING,
+                number("validation_error", "largest position error of a validation trajectory"),
+                number("validation_deformation", "the largest deformation error of one"),
+                number("position_error", "largest position error of a test trajectory"),
+                number("deformation_error", "the largest deformation error of one"),
+                number("time_ratio", f"{runs.RATIO}, median"),
+                number("offline_ratio", runs.OFFLINE_RATIO),
+                number(
+                    "ahead",
+                    "time of the fastest full-order setting on any mesh with at most this "
+                    "validation error, over that of the reduced model; empty: there is none",
+                ),
+            ),
+        ),
+        results.DAY,
+    ),
+    reads={
+        "rows": TableOf("alternatives"),
+        "times": Every(paths.ALTERNATIVE_TIMES),
+        "record": Recorded("frontier"),
+    },
+)
+def frontier(rows: pd.DataFrame, times: list[paths.File], record: list[Path]) -> pd.DataFrame:
+    """One row per setting that no other of its part beats in validation error and time.
+
+    Scenes without validation trajectories, or with other weights than their own, have no rows. A
+    run that blew up has an infinite error.
+    """
+    rows, ms, plain = _of_this_run(rows, times)
+    parts = [
+        _frontier(own, ms.loc[own.index] / plain.loc[own.index])
+        for _, own in rows[rows.stiffness == 1.0].groupby(["scene", "factor"], sort=False)
+        if {*own.motion} > {*MOTIONS}
+    ]
+    made = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+    return results.with_recorded(made, record, frontier.columns)
+
+
+def _frontier(rows: pd.DataFrame, ratios: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the table for those of one mesh, whose times over the plain one are ``ratios``."""
+    vertices = rows.vertices.max()
+    rows = rows[~rows.method.isin([CONVERGED, PLAYBACK])]
+    setting = rows.groupby(SETTING, sort=False, dropna=False).ngroup()
+    made = rows.groupby(setting).first()
+    made = made.assign(simulated=made.vertices, vertices=vertices)
+    tested, blown = rows.motion.isin(MOTIONS), np.isinf(rows.error)
+    errors = {"error": rows.error, "deformation": rows.deformation_error.mask(blown, np.inf)}
+    names = {"validation_error": "error", "validation_deformation": "deformation"}
+    names |= {"position_error": "error", "deformation_error": "deformation"}
+    for name, kind in names.items():
+        chosen = tested != name.startswith("validation")
+        made[name] = errors[kind][chosen].groupby(setting).max()
+    times = ratios.loc[rows.index].stack()
+    made["time_ratio"] = times.groupby(setting[times.index.get_level_values(0)].to_numpy()).median()
+    made["offline_ratio"] = rows.offline_ratio.groupby(setting).median()
+    made = made[np.isfinite(made.validation_error) & made.time_ratio.notna()]
+    reduced, coarser = made.method.isin(REDUCTIONS), made.simulated < vertices
+    made["part"] = np.select([reduced, coarser], [REDUCED, COARSER], SAME)
+    full = made[~reduced]
+    made["ahead"] = [
+        full.time_ratio[full.validation_error <= row.validation_error].min() / row.time_ratio
+        for row in made.itertuples()
+    ]
+    made["ahead"] = made.ahead.where(reduced)
+    best = [
+        own[pareto(own.validation_error.to_list(), own.time_ratio.to_list())]
+        for own in (made[made.part == part].sort_values("time_ratio") for part in PARTS)
+    ]
+    return pd.concat(best)
