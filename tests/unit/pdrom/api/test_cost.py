@@ -76,7 +76,7 @@ def test_a_body_that_is_rigid_or_at_rest_or_blows_up_has_no_such_errors(monkeypa
     rigid, still = api.cost(sheet(GRAVITY, SPRING)), api.cost(sheet(LEFT, SPRING))
     assert rigid.deformation_error.isna().all()
     assert still.position_error.isna().all()
-    assert still.setting[still.best].str.contains("on 16 vertices").all()
+    assert still.setting[still.best].tolist() == [still.setting[0]]
     monkeypatch.setattr("pdrom.reduction.settings.BLOWUP_EXTENT", 0.1)
     table = api.cost(sheet())
     assert np.isinf(table[["position_error", "deformation_error"]]).all(axis=None)

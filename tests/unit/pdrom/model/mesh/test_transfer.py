@@ -32,7 +32,8 @@ def distance(corners: np.ndarray, point: np.ndarray) -> float:
 def test_a_point_inside_has_affine_values_and_one_outside_those_of_the_nearest_point(
     mesh, rng, monkeypatch
 ):
-    monkeypatch.setattr(transfer, "PAIRS", 500)  # points are compared in parts
+    for name, few in (("PAIRS", 500), ("FIRST", 1)):  # the search goes on, in parts
+        monkeypatch.setattr(transfer, name, few)
     cells = mesh.tetrahedra if len(mesh.tetrahedra) else mesh.triangles
     shares = rng.dirichlet(np.ones(cells.shape[1]), len(cells))
     inside = np.einsum("em,emd->ed", shares, mesh.points[cells])
