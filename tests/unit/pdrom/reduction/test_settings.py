@@ -57,7 +57,7 @@ def test_a_converged_setting_has_no_error_more_iterations_less_and_a_blow_up_non
 def test_a_model_of_all_columns_is_the_full_order_and_newton_the_converged_step(scene, truth):
     columns = make_columns([scene], truth.reference[1:], 0, 0, np.eye(scene.mesh.vertices), ())
     model = SubspaceModel(columns)
-    five, exact = (reduced({}, scene, model, count) for count in (5, None))
+    five, exact = (reduced({}, scene, model, *how) for how in ((5, False), (None, True)))
     assert five.run(8, 1.0) == pytest.approx(trajectory(scene.iterated(5)), abs=1e-9)
     assert exact.errors(truth)[1] < 1e-4
     assert five.output is not None
