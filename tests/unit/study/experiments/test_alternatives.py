@@ -83,8 +83,8 @@ def test_rows_of_a_scene(written, table):
     )  # fmt: skip
     ratio = (other / plain).groupby(["motion", "stiffness"]).median()
     found = timed[timed.method == "anderson"].set_index(["motion", "stiffness"]).time_ratio
-    pd.testing.assert_series_equal(found.sort_index(), ratio.sort_index(), check_names=False, check_index_type=False
-    )
+    same = {"check_names": False, "check_index_type": False}
+    pd.testing.assert_series_equal(found.sort_index(), ratio.sort_index(), **same)
 
 
 def test_errors_of_a_scene(table):
