@@ -245,7 +245,7 @@ def payoff(payoff: pd.DataFrame) -> Rows:
         yield [_name(f"{row.method}{basis}"), *counts, *gains, *errors, *scored]
 
 
-APART = 1.5  # least ratio of the validation errors of two neighbours in the table frontier
+APART = 2.0  # least ratio of the validation errors of two neighbours in the table frontier
 
 
 def _setting(row: Any) -> str:
