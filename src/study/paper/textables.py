@@ -14,7 +14,7 @@ from study.artifact.text import escape
 from study.experiments.error_budget import PARTS
 from study.figures.kit.declaration import declarations
 from study.paper.macros import HIDDEN, format_number
-from study.tables.equal_error import REDUCED, SAME
+from study.tables.equal_error import AHEAD, REDUCED, SAME
 from study.tables.kit.results import FAILED, MEASURES, MEDIAN, over_motions, trained
 
 NONE = "--"
@@ -279,7 +279,8 @@ def frontier(frontier: pd.DataFrame) -> Rows:
             tested = f"{_known(row.position_error)} ({_known(row.deformation_error)})"
             first = [opening, _setting(row), _known(row.validation_error), tested]
             training = _known(row.offline_ratio, _rounded)
-            yield [*first, _known(row.time_ratio), training, _known(row.ahead)]
+            ahead = [getattr(row, name) for name in AHEAD if row.part == REDUCED]
+            yield [*first, _known(row.time_ratio), training, " / ".join(map(_known, ahead)) or NONE]
             opening, before = "", row.validation_error
 
 

@@ -127,5 +127,6 @@ def test_the_frontier_is_chosen_on_validation_trajectories(tmp_path):
     # times are medians of the three trajectories, of which two are slower
     assert found.time_ratio[0] == 0.0625
     assert found.ahead.tolist() == pytest.approx([2.0, 8.0, 8.0, 8.0, *[np.nan] * 5], nan_ok=True)
+    assert [*found.ahead_test[:2], *found.ahead_deformation[:2]] == [2.0, 8.0] * 2
     few = made(tmp_path, cases=dict.fromkeys(MOTIONS, 1.0))
     assert frontier(*few, []).empty
