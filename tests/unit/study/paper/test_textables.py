@@ -111,8 +111,10 @@ TABLES = {
         "part method simulated iterations k skinning tolerance training_motions validation_error "
         "position_error deformation_error time_ratio offline_ratio ahead "
         "ahead_test ahead_deformation",
-        ("reduced", "ecsw", 9, 5, 40, 10, 0.01, 2, 0.05, 0.0625, 0.125, 0.5, 1234.5, 2.0, 1.5, None),
-        ("reduced", "ecsw-newton", 9, None, 20, 0, 0.1, 1, 0.02, 0.0625, None, 0.75, 90.0, *3 * [None]),
+        ("reduced", "ecsw", 9, 5, 40, 10, 0.01, 2, 0.05, 0.0625, 0.125, 0.5, 1234.5,
+         2.0, 1.5, None),
+        ("reduced", "ecsw-newton", 9, None, 20, 0, 0.1, 1, 0.02, 0.0625, None, 0.75, 90.0,
+         *3 * [None]),
         *(
             (part, method, *sizes, *4 * [None], error, 0.125, 0.25, 1.0, *4 * [None])
             for part, method, sizes, error in (
