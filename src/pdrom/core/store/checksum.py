@@ -231,8 +231,6 @@ def move_aside(path: str | os.PathLike[str]) -> str:
         aside = aside.with_name(f"{aside.name}.damaged")
     try:
         os.replace(path, aside)
-        if checksum.is_dir():
-            checksum.rename(aside.with_name(f".{aside.name}{CHECKSUM_SUFFIX}"))
         checksum.unlink(missing_ok=True)
     except OSError as error:
         return f"; delete it, it cannot be renamed ({reason(error)})"
