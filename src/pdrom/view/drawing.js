@@ -180,7 +180,7 @@ const pdromDrawing = (() => {
     constructor(gl) {
       this.gl = gl;
       this.programs = [false, true].map((lifted) => this._program(VERTEX(lifted)));
-      this.buffers = new Map();
+      this.buffers = new WeakMap(); // the card frees what belongs to a layer that is gone
       this.scale = Float32Array.from(VIRIDIS.flat());
     }
 
@@ -196,12 +196,7 @@ const pdromDrawing = (() => {
       gl.bindAttribLocation(program, 1, "position");
       gl.linkProgram(program);
       if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
-      return { program, places: new Map() };
-    }
-
-    _place(own, name) {
-      if (!own.places.has(name)) own.places.set(name, this.gl.getUniformLocation(own.program, name));
-      return own.places.get(name);
+      return program;
     }
 
     _own(layer) {
@@ -229,14 +224,6 @@ const pdromDrawing = (() => {
       return { texture, texels };
     }
 
-    forget(layer) {
-      const { gl } = this, own = this.buffers.get(layer);
-      if (!own) return;
-      for (const buffer of [own.indices, own.positions, own.values]) gl.deleteBuffer(buffer);
-      if (own.basis) gl.deleteTexture(own.basis.texture);
-      this.buffers.delete(layer);
-    }
-
     draw(layers, views, camera) {
       const { gl } = this, { width, height } = gl.canvas;
       gl.viewport(0, 0, width, height);
@@ -257,8 +244,8 @@ const pdromDrawing = (() => {
 
     _layer(layer, toClip, camera) {
       const { gl } = this, own = this._own(layer), program = this.programs[own.basis ? 1 : 0];
-      const at = (name) => this._place(program, name);
-      gl.useProgram(program.program);
+      const at = (name) => gl.getUniformLocation(program, name);
+      gl.useProgram(program);
       gl.uniformMatrix4fv(at("toClip"), false, toClip);
       gl.uniform3fv(at("colour"), layer.colour);
       gl.uniform1f(at("alpha"), layer.alpha);
@@ -304,8 +291,6 @@ const pdromDrawing = (() => {
     constructor(context) {
       this.context = context;
     }
-
-    forget() {}
 
     draw(layers, views, camera) {
       const { context } = this, { width, height } = context.canvas;
@@ -409,7 +394,6 @@ const pdromDrawing = (() => {
     }
 
     clear() {
-      this.layers.forEach((layer) => this.pen.forget(layer));
       this.layers = [];
     }
 
@@ -519,16 +503,6 @@ const pdromDrawing = (() => {
     return b ? Math.max(Math.hypot(a[0] - b[0], a[1] - b[1]), 1) : 1;
   }
 
-  // Smallest ball about the middle of the bounding box of frames (n, 3): its centre and radius.
-  function ball(frames) {
-    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    for (const q of frames) for (let i = 0; i < q.length; i++) {
-      low[i % 3] = Math.min(low[i % 3], q[i]);
-      high[i % 3] = Math.max(high[i % 3], q[i]);
-    }
-    return [low.map((x, i) => 0.5 * (x + high[i])), 0.5 * Math.hypot(...minus(high, low))];
-  }
-
   // A colour of the page's style sheet, by the name of its variable: from 0 to 1.
   function colour(name) {
     const text = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -544,5 +518,5 @@ const pdromDrawing = (() => {
     select.nextElementSibling.textContent = select.hidden ? values.map(words).join("") : "";
   }
 
-  return { Drawing, Layer, ball, colour, fill };
+  return { Drawing, Layer, colour, fill };
 })();

@@ -1,7 +1,7 @@
 "use strict";
 // The page's own script: choices, handles, the loop of frames, and what is said about them.
 (() => {
-  const { Drawing, Layer, ball, colour, fill } = pdromDrawing;
+  const { Drawing, Layer, colour, fill } = pdromDrawing;
   const SPEED = 0.03; // a handle moves at most this part of the scene's size a frame
   const REACH = 26; // CSS pixels from a handle's vertex within which a pointer takes it
   const KEY_STEP = 0.04; // of the scene's size
@@ -191,7 +191,7 @@
   }
 
   function floor(height) {
-    const [[x, , z], radius] = ball(shown.frames), r = 1.2 * radius;
+    const { centre: [x, , z], radius } = drawing.camera, r = 2 * radius;
     const layer = new Layer({ triangles: Uint32Array.of(0, 1, 2, 0, 2, 3), n: 4, colour: colour("--floor"), alpha: 0.3 });
     layer.set(Float32Array.of(x - r, height, z - r, x + r, height, z - r, x + r, height, z + r, x - r, height, z + r));
     return layer;
