@@ -82,9 +82,10 @@ const pdromDrawing = (() => {
       this.valued++;
     }
 
-    // B: Float32Array (n, K)
-    lifted(B, K) {
+    // B: Float32Array (n, K), for the graphics card; lift writes the positions (n, 3) where that does not
+    lifted(B, K, lift) {
       this.basis = { B, K };
+      this.lift = lift;
     }
 
     move(z) {
@@ -95,21 +96,9 @@ const pdromDrawing = (() => {
 
     // Positions (n, 3); lifted here if nobody did so far.
     get current() {
-      if (!this.basis || !this.stale) return this.positions;
-      const { B, K } = this.basis, q = this.positions;
-      for (let v = 0, at = 0; v < this.n; v++) {
-        let x = 0, y = 0, w = 0;
-        for (let k = 0; k < 3 * K; k += 3, at++) {
-          x += B[at] * this.z[k];
-          y += B[at] * this.z[k + 1];
-          w += B[at] * this.z[k + 2];
-        }
-        q[3 * v] = x;
-        q[3 * v + 1] = y;
-        q[3 * v + 2] = w;
-      }
+      if (this.basis && this.stale) this.lift(this.positions);
       this.stale = false;
-      return q;
+      return this.positions;
     }
   }
 
@@ -150,6 +139,12 @@ const pdromDrawing = (() => {
     axes(eye = this.eye) {
       const right = unit(cross(this.up, eye));
       return [right, cross(eye, right), eye];
+    }
+
+    // Direction to the light, from above and left of the eye.
+    get light() {
+      const [x, y, z] = this.axes();
+      return unit(z.map((v, i) => v + 0.5 * y[i] - 0.45 * x[i]));
     }
 
     get distance() {
@@ -226,7 +221,6 @@ const pdromDrawing = (() => {
 
     draw(layers, views, camera) {
       const { gl } = this, { width, height } = gl.canvas;
-      gl.viewport(0, 0, width, height);
       gl.clearColor(0, 0, 0, 0);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       gl.enable(gl.DEPTH_TEST);
@@ -251,9 +245,7 @@ const pdromDrawing = (() => {
       gl.uniform1f(at("alpha"), layer.alpha);
       gl.uniform1f(at("size"), layer.size * (window.devicePixelRatio || 1));
       gl.uniform1i(at("look"), LOOKS[layer.look]);
-      // light from above and left of the eye
-      const [x, y, z] = camera.axes();
-      gl.uniform3fv(at("towards"), unit(z.map((v, i) => v + 0.5 * y[i] - 0.45 * x[i])));
+      gl.uniform3fv(at("towards"), camera.light);
       gl.uniform3fv(at("scale"), this.scale);
       if (own.basis) {
         gl.bindTexture(gl.TEXTURE_2D, own.basis.texture);
@@ -319,7 +311,7 @@ const pdromDrawing = (() => {
 
     _surface(layer, seen, camera) {
       const { context } = this, t = layer.indices, count = t.length / 3, q = layer.current;
-      const [x, y, z] = camera.axes(), towards = unit(z.map((v, i) => v + 0.5 * y[i] - 0.45 * x[i]));
+      const towards = camera.light;
       const depth = (f) => seen[3 * t[3 * f] + 2] + seen[3 * t[3 * f + 1] + 2] + seen[3 * t[3 * f + 2] + 2];
       const depths = Float32Array.from({ length: count }, (_, f) => depth(f));
       const order = Uint32Array.from({ length: count }, (_, f) => f).sort((a, b) => depths[b] - depths[a]);

@@ -181,7 +181,7 @@
     drawing.camera.look(...drawing.fit(sampled()));
     layers = { body: new Layer({ triangles, n, colour: colour("--surface") }),
       ghost: new Layer({ triangles, n, look: "wires", colour: colour("--ghost"), alpha: 0.45 }) };
-    layers.body.lifted(B, K);
+    layers.body.lifted(B, K, (out) => run.basis.lift(run.z, vertices, out));
     run.held = Uint32Array.from(handles.flatMap((handle) => handle.vertices));
     layers.handles = new Layer({ n: run.held.length, look: "points", points: run.held.map((_, i) => i),
       colour: colour("--handle") });
@@ -216,11 +216,8 @@
 
   // Positions of the recorded run at a frame, between two stored ones if need be; null after its end.
   function recordedAt(frame) {
-    const { frames, data: { motion, shown: { stride } } } = shown, place = frame / stride, first = Math.floor(place);
-    if (motion === null || place > frames.length - 1) return null;
-    const part = place - first;
-    if (part === 0) return frames[first];
-    return frames[first].map((x, i) => (1 - part) * x + part * frames[first + 1][i]);
+    const { frames, data: { motion, shown: { stride } } } = shown, place = frame / stride;
+    return motion === null || place > frames.length - 1 ? null : pdromPacked.between(frames, place);
   }
 
   // ---- words ----

@@ -11,13 +11,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal
 
-from pydantic import ValidationError
-
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import ORIGIN
 from pdrom.core.store import Condition, check_file, write_text
 from pdrom.core.store.checksum import Checksum, read_checksum
-from pdrom.core.yamlfile import ConfigModel, describe
+from pdrom.core.yamlfile import ConfigModel
 from study.artifact import paths
 from study.pipeline.plan import Plan
 
@@ -86,9 +84,8 @@ def read_manifest(results: str) -> Manifest:
         raise StorageError(f"{path}: damaged, its content and its checksum differ")
     try:
         return Manifest.model_validate_json(path.read_text(encoding="utf-8"))
-    except (ValidationError, UnicodeDecodeError) as error:
-        fault = describe(error, Manifest) if isinstance(error, ValidationError) else error
-        raise StorageError(f"{path}: {fault}") from error
+    except ValueError as error:
+        raise StorageError(f"{path}: no manifest of this version of pdrom") from error
 
 
 def _entry(path: Path, checksum: Checksum, environments: dict[str, dict[str, str]]) -> Entry:

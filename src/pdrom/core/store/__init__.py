@@ -65,13 +65,7 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             # the checksum first: a process killed in between leaves no result without a checksum,
             # but one that is missing or does not match it, which the next run makes again
             os.replace(checksum, checksum_path(target))
-            os.replace(temporary, target)
-        else:
-            os.replace(temporary, target)
-            place = checksum_path(target)
-            content = place.read_bytes() if place.is_file() else b""
-            if sums.Checksum.parse(content).content == content:
-                place.unlink()  # checksum of the file that was just replaced
+        os.replace(temporary, target)
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
     finally:

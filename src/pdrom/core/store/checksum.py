@@ -227,8 +227,6 @@ def move_aside(path: str | os.PathLike[str]) -> str:
     """Rename ``path``, also a folder or link, to ``NAME.damaged``; return words that say so."""
     path = Path(path)
     aside, checksum = path.with_name(f"{path.name}.damaged"), checksum_path(path)
-    while os.path.lexists(aside) and (aside.is_dir() or path.is_dir()):
-        aside = aside.with_name(f"{aside.name}.damaged")
     try:
         os.replace(path, aside)
         checksum.unlink(missing_ok=True)

@@ -156,7 +156,7 @@ LIFTED = """
   const layer = drawing.add(new pdromDrawing.Layer({ triangles: Uint32Array.of(0, 1, 2), n: 3 }));
   const B = new Float32Array(3 * size), z = new Float32Array(3 * size);
   for (let v = 0; v < 3; v++) B[size * v + size - 1 - v] = z[3 * (size - 1 - v) + v] = 1;
-  layer.lifted(B, size);
+  layer.lifted(B, size, (out) => out.set([1, 0, 0, 0, 1, 0, 0, 0, 1]));
   layer.move(z);
   drawing.camera.look([0, 0, 0], 2);
   drawing.draw();

@@ -130,13 +130,6 @@ def test_a_file_of_another_program_is_refused(tmp_path):
         store.require_own(path)
 
 
-def test_a_hidden_file_of_another_program_stays(tmp_path):
-    path = tmp_path / "page.html"
-    store.checksum_path(path).write_text("mine")
-    store.write_text("page", path, with_checksum=False)
-    assert store.checksum_path(path).read_text() == "mine"
-
-
 def test_who_writes_the_same_file_at_once_keeps_the_own(tmp_path):
     path = tmp_path / "result.txt"
     with store.atomic_path(path) as first:
@@ -282,13 +275,6 @@ def test_a_file_without_a_checksum_inside_is_refused_unless_asked_for(plain):
     ):
         pass
     assert sorted(plain.parent.iterdir()) == sorted([plain, store.checksum_path(plain)])
-
-
-def test_a_new_file_takes_the_hidden_checksum_of_an_old_one_along(plain):
-    with store.write_hdf5(plain) as file:
-        file["x"] = 1
-    assert list(plain.parent.iterdir()) == [plain]
-    assert store.check_file(plain) == "intact"
 
 
 @pytest.mark.parametrize("damaged", [True, False])
