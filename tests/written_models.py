@@ -1,5 +1,6 @@
 """Files of models for the page, of small scenes."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,12 @@ from study.live.page import live_page
 def write_page(folder: Path, models: list[Path]) -> Path:
     """The page of some files of models, which lie below its folder."""
     out = folder / "live.html"
-    live_page([File(str(path), {}) for path in models], outputs={"out": str(out)}, parts=[])
+    scenes = [re.search(r'"scene":"(\w+)"', path.read_text("utf-8")) for path in models]
+    files = [
+        File(str(path), {"scene": scene[1] if scene else path.stem})
+        for path, scene in zip(models, scenes, strict=True)
+    ]
+    live_page(files, outputs={"out": str(out)}, parts=[])
     return out
 
 

@@ -4,15 +4,17 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path, PurePath
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar
 
 import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
 
 from pdrom.core.errors import ConfigurationError, choices
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 100
+UNKNOWN = "unknown_key"  # type of the fault of a key that a model does not have
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -24,11 +26,13 @@ class ConfigModel(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _as_written(cls, data: Any) -> Any:
-        """Refuse truth values (yes, on, true) and texts such as 1_0 where numbers are required."""
+        """Refuse unknown keys, and truth values (yes, on) or texts such as 1_0 for numbers."""
         fields = {field.alias or name: field for name, field in cls.model_fields.items()}
         for key, value in data.items() if isinstance(data, dict) else ():
-            field = fields.get(key)
-            kind = bool if field is None else field.annotation
+            if key not in fields and isinstance(key, str):
+                more = {"key": key, "choices": choices(key, fields)}
+                raise PydanticCustomError(UNKNOWN, "unknown key {key}{choices}", more)
+            kind = fields[key].annotation if key in fields else bool
             for entry in value if isinstance(value, (list, tuple)) else [value]:
                 if isinstance(entry, bool) and kind is not bool:
                     fault = "a truth value (yes, on, true ...)"
@@ -158,9 +162,9 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     message = fault["msg"].removeprefix("Value error, ")
     # users write a list in YAML where Python has a tuple
     message = message.replace("valid tuple", "valid list").replace("Tuple should", "List should")
-    if fault["type"] == "extra_forbidden":
-        owner = _model_at(model, location[:-1])
-        return f"unknown key '{key}'{choices(location[-1], keys_of(owner)) if owner else ''}"
+    if fault["type"] == UNKNOWN:
+        place = ".".join([*names, fault["ctx"]["key"]])
+        return f"unknown key '{place}'{fault['ctx']['choices']}"
     if fault["type"] == "invalid_key":
         return f"{key}: the key is not a text"
     if fault["type"] == "missing":
@@ -184,24 +188,6 @@ def shown(value: Any, width: int) -> str:
 def keys_of(model: type[BaseModel]) -> list[str]:
     """Names of the keys that ``model`` accepts."""
     return [field.alias or name for name, field in model.model_fields.items()]
-
-
-def _model_at(model: type[BaseModel], location: tuple[int | str, ...]) -> type[BaseModel] | None:
-    """Model of the value at ``location`` (keys, indices); None if it has none, or several."""
-    current: type[BaseModel] | None = model
-    for part in location:
-        if isinstance(part, int) or current is None:
-            continue
-        field = current.model_fields.get(part)
-        current = _inner_model(field.annotation) if field else current
-    return current
-
-
-def _inner_model(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    models = [m for a in get_args(annotation) if (m := _inner_model(a)) is not None]
-    return models[0] if len(models) == 1 else None
 
 
 # Longest file name and longest path that operating systems accept, in bytes.

@@ -82,9 +82,10 @@ const pdromDrawing = (() => {
       this.valued++;
     }
 
-    // B: Float32Array (n, K)
-    lifted(B, K) {
+    // B: Float32Array (n, K), for the graphics card; lift writes the positions (n, 3) where that does not
+    lifted(B, K, lift) {
       this.basis = { B, K };
+      this.lift = lift;
     }
 
     move(z) {
@@ -95,21 +96,9 @@ const pdromDrawing = (() => {
 
     // Positions (n, 3); lifted here if nobody did so far.
     get current() {
-      if (!this.basis || !this.stale) return this.positions;
-      const { B, K } = this.basis, q = this.positions;
-      for (let v = 0, at = 0; v < this.n; v++) {
-        let x = 0, y = 0, w = 0;
-        for (let k = 0; k < 3 * K; k += 3, at++) {
-          x += B[at] * this.z[k];
-          y += B[at] * this.z[k + 1];
-          w += B[at] * this.z[k + 2];
-        }
-        q[3 * v] = x;
-        q[3 * v + 1] = y;
-        q[3 * v + 2] = w;
-      }
+      if (this.basis && this.stale) this.lift(this.positions);
       this.stale = false;
-      return q;
+      return this.positions;
     }
   }
 
@@ -152,6 +141,12 @@ const pdromDrawing = (() => {
       return [right, cross(eye, right), eye];
     }
 
+    // Direction to the light, from above and left of the eye.
+    get light() {
+      const [x, y, z] = this.axes();
+      return unit(z.map((v, i) => v + 0.5 * y[i] - 0.45 * x[i]));
+    }
+
     get distance() {
       return this.far * this.radius * Math.hypot(1, FOCUS);
     }
@@ -180,7 +175,7 @@ const pdromDrawing = (() => {
     constructor(gl) {
       this.gl = gl;
       this.programs = [false, true].map((lifted) => this._program(VERTEX(lifted)));
-      this.buffers = new Map();
+      this.buffers = new WeakMap(); // the card frees what belongs to a layer that is gone
       this.scale = Float32Array.from(VIRIDIS.flat());
     }
 
@@ -196,12 +191,7 @@ const pdromDrawing = (() => {
       gl.bindAttribLocation(program, 1, "position");
       gl.linkProgram(program);
       if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
-      return { program, places: new Map() };
-    }
-
-    _place(own, name) {
-      if (!own.places.has(name)) own.places.set(name, this.gl.getUniformLocation(own.program, name));
-      return own.places.get(name);
+      return program;
     }
 
     _own(layer) {
@@ -229,17 +219,8 @@ const pdromDrawing = (() => {
       return { texture, texels };
     }
 
-    forget(layer) {
-      const { gl } = this, own = this.buffers.get(layer);
-      if (!own) return;
-      for (const buffer of [own.indices, own.positions, own.values]) gl.deleteBuffer(buffer);
-      if (own.basis) gl.deleteTexture(own.basis.texture);
-      this.buffers.delete(layer);
-    }
-
     draw(layers, views, camera) {
       const { gl } = this, { width, height } = gl.canvas;
-      gl.viewport(0, 0, width, height);
       gl.clearColor(0, 0, 0, 0);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       gl.enable(gl.DEPTH_TEST);
@@ -257,16 +238,14 @@ const pdromDrawing = (() => {
 
     _layer(layer, toClip, camera) {
       const { gl } = this, own = this._own(layer), program = this.programs[own.basis ? 1 : 0];
-      const at = (name) => this._place(program, name);
-      gl.useProgram(program.program);
+      const at = (name) => gl.getUniformLocation(program, name);
+      gl.useProgram(program);
       gl.uniformMatrix4fv(at("toClip"), false, toClip);
       gl.uniform3fv(at("colour"), layer.colour);
       gl.uniform1f(at("alpha"), layer.alpha);
       gl.uniform1f(at("size"), layer.size * (window.devicePixelRatio || 1));
       gl.uniform1i(at("look"), LOOKS[layer.look]);
-      // light from above and left of the eye
-      const [x, y, z] = camera.axes();
-      gl.uniform3fv(at("towards"), unit(z.map((v, i) => v + 0.5 * y[i] - 0.45 * x[i])));
+      gl.uniform3fv(at("towards"), camera.light);
       gl.uniform3fv(at("scale"), this.scale);
       if (own.basis) {
         gl.bindTexture(gl.TEXTURE_2D, own.basis.texture);
@@ -305,8 +284,6 @@ const pdromDrawing = (() => {
       this.context = context;
     }
 
-    forget() {}
-
     draw(layers, views, camera) {
       const { context } = this, { width, height } = context.canvas;
       context.clearRect(0, 0, width, height);
@@ -334,7 +311,7 @@ const pdromDrawing = (() => {
 
     _surface(layer, seen, camera) {
       const { context } = this, t = layer.indices, count = t.length / 3, q = layer.current;
-      const [x, y, z] = camera.axes(), towards = unit(z.map((v, i) => v + 0.5 * y[i] - 0.45 * x[i]));
+      const towards = camera.light;
       const depth = (f) => seen[3 * t[3 * f] + 2] + seen[3 * t[3 * f + 1] + 2] + seen[3 * t[3 * f + 2] + 2];
       const depths = Float32Array.from({ length: count }, (_, f) => depth(f));
       const order = Uint32Array.from({ length: count }, (_, f) => f).sort((a, b) => depths[b] - depths[a]);
@@ -409,7 +386,6 @@ const pdromDrawing = (() => {
     }
 
     clear() {
-      this.layers.forEach((layer) => this.pen.forget(layer));
       this.layers = [];
     }
 
@@ -519,16 +495,6 @@ const pdromDrawing = (() => {
     return b ? Math.max(Math.hypot(a[0] - b[0], a[1] - b[1]), 1) : 1;
   }
 
-  // Smallest ball about the middle of the bounding box of frames (n, 3): its centre and radius.
-  function ball(frames) {
-    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    for (const q of frames) for (let i = 0; i < q.length; i++) {
-      low[i % 3] = Math.min(low[i % 3], q[i]);
-      high[i % 3] = Math.max(high[i % 3], q[i]);
-    }
-    return [low.map((x, i) => 0.5 * (x + high[i])), 0.5 * Math.hypot(...minus(high, low))];
-  }
-
   // A colour of the page's style sheet, by the name of its variable: from 0 to 1.
   function colour(name) {
     const text = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -544,5 +510,5 @@ const pdromDrawing = (() => {
     select.nextElementSibling.textContent = select.hidden ? values.map(words).join("") : "";
   }
 
-  return { Drawing, Layer, ball, colour, fill };
+  return { Drawing, Layer, colour, fill };
 })();

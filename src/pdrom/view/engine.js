@@ -91,20 +91,11 @@ const pdromEngine = (() => {
   // ---- projections of one element: d and p are (rows, 3) at place `at` of arrays ----
 
   function toLength(d, p, at, length, rest) {
-    const x = d[at], y = d[at + 1], z = d[at + 2], scale = Math.abs(x) + Math.abs(y) + Math.abs(z);
-    const square = x * x + y * y + z * z;
-    if (square >= 1e-280 && square <= 1e280) {
-      const factor = length / Math.sqrt(square);
-      p[at] = factor * x;
-      p[at + 1] = factor * y;
-      p[at + 2] = factor * z;
-    } else {
-      const u = x / (scale + SMALLEST), v = y / (scale + SMALLEST), w = z / (scale + SMALLEST);
-      const factor = length / Math.sqrt(u * u + v * v + w * w);
-      p[at] = scale === 0 ? rest[0] : factor * u;
-      p[at + 1] = scale === 0 ? rest[1] : factor * v;
-      p[at + 2] = scale === 0 ? rest[2] : factor * w;
-    }
+    const x = d[at], y = d[at + 1], z = d[at + 2], square = x * x + y * y + z * z;
+    const factor = length / Math.sqrt(square);
+    p[at] = square === 0 ? rest[0] : factor * x;
+    p[at + 1] = square === 0 ? rest[1] : factor * y;
+    p[at + 2] = square === 0 ? rest[2] : factor * z;
   }
 
   const clamp = (value, low, high) => (value < low ? low : value > high ? high : value);

@@ -1,7 +1,7 @@
 "use strict";
 // The page's own script: choices, handles, the loop of frames, and what is said about them.
 (() => {
-  const { Drawing, Layer, ball, colour, fill } = pdromDrawing;
+  const { Drawing, Layer, colour, fill } = pdromDrawing;
   const SPEED = 0.03; // a handle moves at most this part of the scene's size a frame
   const REACH = 26; // CSS pixels from a handle's vertex within which a pointer takes it
   const KEY_STEP = 0.04; // of the scene's size
@@ -181,7 +181,7 @@
     drawing.camera.look(...drawing.fit(sampled()));
     layers = { body: new Layer({ triangles, n, colour: colour("--surface") }),
       ghost: new Layer({ triangles, n, look: "wires", colour: colour("--ghost"), alpha: 0.45 }) };
-    layers.body.lifted(B, K);
+    layers.body.lifted(B, K, (out) => run.basis.lift(run.z, vertices, out));
     run.held = Uint32Array.from(handles.flatMap((handle) => handle.vertices));
     layers.handles = new Layer({ n: run.held.length, look: "points", points: run.held.map((_, i) => i),
       colour: colour("--handle") });
@@ -191,7 +191,7 @@
   }
 
   function floor(height) {
-    const [[x, , z], radius] = ball(shown.frames), r = 1.2 * radius;
+    const { centre: [x, , z], radius } = drawing.camera, r = 2 * radius;
     const layer = new Layer({ triangles: Uint32Array.of(0, 1, 2, 0, 2, 3), n: 4, colour: colour("--floor"), alpha: 0.3 });
     layer.set(Float32Array.of(x - r, height, z - r, x + r, height, z - r, x + r, height, z + r, x - r, height, z + r));
     return layer;
@@ -216,11 +216,8 @@
 
   // Positions of the recorded run at a frame, between two stored ones if need be; null after its end.
   function recordedAt(frame) {
-    const { frames, data: { motion, shown: { stride } } } = shown, place = frame / stride, first = Math.floor(place);
-    if (motion === null || place > frames.length - 1) return null;
-    const part = place - first;
-    if (part === 0) return frames[first];
-    return frames[first].map((x, i) => (1 - part) * x + part * frames[first + 1][i]);
+    const { frames, data: { motion, shown: { stride } } } = shown, place = frame / stride;
+    return motion === null || place > frames.length - 1 ? null : pdromPacked.between(frames, place);
   }
 
   // ---- words ----

@@ -37,5 +37,11 @@ const pdromPacked = (() => {
     return all;
   }
 
-  return { unpack, unpacked, frames };
+  // Positions at a place between stored frames; after the end the last ones.
+  function between(all, place) {
+    const first = Math.min(Math.floor(place), all.length - 1), part = place - first, next = all[first + 1];
+    return part === 0 || !next ? all[first] : all[first].map((x, i) => x + part * (next[i] - x));
+  }
+
+  return { unpack, unpacked, frames, between };
 })();

@@ -28,15 +28,6 @@
   // Whether both runs are in one picture, the full order as wires: two surfaces in one place would flicker.
   const above = () => at("view").value === "above" && shown.reduced;
 
-  // Positions at a frame, also between two; a run that ended early keeps its last one.
-  function between(frames, k) {
-    const first = Math.min(Math.floor(k), frames.length - 1), part = k - first;
-    if (part === 0 || first === frames.length - 1) return frames[first];
-    const a = frames[first], b = frames[first + 1], q = new Float32Array(a.length);
-    for (let i = 0; i < q.length; i++) q[i] = a[i] + part * (b[i] - a[i]);
-    return q;
-  }
-
   async function choose() {
     const [scene, run] = chosenRun(), bodies = [];
     for (const body of scene.bodies) {
@@ -79,10 +70,10 @@
 
   // Draws frame k of what is stored, which may lie between two of them.
   function show(k) {
-    const full = between(shown.full, k);
+    const full = pdromPacked.between(shown.full, k);
     layers.full.set(full);
     if (shown.reduced) {
-      const reduced = between(shown.reduced, k);
+      const reduced = pdromPacked.between(shown.reduced, k);
       layers.reduced.set(reduced);
       layers.reduced.shade(at("colour").checked ? distances(reduced, full, 0.1 * side() / 1.4) : null);
     }

@@ -9,16 +9,8 @@ from collections.abc import Callable
 
 from study.artifact.text import escape
 
-_Words = Callable[[str], str]
 _MARK = re.compile(r"`([^`]*)`|\$([^$]*)\$")
 _KEY = re.compile(r"\{([a-z_.]+)\}")
-_SIGNS = {
-    r"\gamma": "γ", r"\tau": "τ", r"\sigma": "σ", r"\le": "≤", r"\ge": "≥", r"\times": "×",
-    r"\infty": "∞", r"\cdot": "·", r"\%": "%", r"\,": " ", "-": "−",
-}  # fmt: skip
-_SIGN = re.compile("|".join(sorted(map(re.escape, _SIGNS), key=len, reverse=True)))
-_RAISED = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def filled(text: str, value: Callable[[str], float]) -> str:
@@ -37,26 +29,15 @@ def number(value: float) -> str:
 
 def to_tex(text: str) -> str:
     """Convert the mark-up ``text`` to TeX."""
-    return _converted(text, escape, lambda name: rf"\texttt{{{escape(name)}}}", lambda m: f"${m}$")
+    pieces, end = [], 0
+    for found in _MARK.finditer(text):
+        pieces.append(escape(text[end : found.start()]))
+        name, formula = found.groups()
+        pieces.append(f"${formula}$" if name is None else rf"\texttt{{{escape(name)}}}")
+        end = found.end()
+    return "".join([*pieces, escape(text[end:])])
 
 
 def to_plain(text: str) -> str:
-    """Convert the mark-up ``text`` to plain words."""
-    return _converted(text, str, str, _plain_mathematics)
-
-
-def _converted(text: str, words: _Words, name: _Words, mathematics: _Words) -> str:
-    pieces, end = [], 0
-    for found in _MARK.finditer(text):
-        pieces.append(words(text[end : found.start()]))
-        pieces.append(name(found[1]) if found[1] is not None else mathematics(found[2]))
-        end = found.end()
-    return "".join([*pieces, words(text[end:])])
-
-
-def _plain_mathematics(formula: str) -> str:
-    """Convert a formula to plain text with Unicode signs, exponents and indices."""
-    text = _SIGN.sub(lambda found: _SIGNS[found[0]], formula)
-    text = re.sub(r"\^(?:\{([^{}]*)\}|(.))", lambda f: (f[1] or f[2]).translate(_RAISED), text)
-    text = re.sub(r"_(?:\{([^{}]*)\}|(.))", lambda f: (f[1] or f[2]).translate(_LOWERED), text)
-    return text.replace("{", "").replace("}", "")
+    """Remove the marks of names and formulas from the mark-up ``text`` of a title."""
+    return re.sub("[`$]", "", text)

@@ -7,20 +7,17 @@ digest of their checksum, other files also a SHA-256. Equal results have equal m
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal
-
-from pydantic import ValidationError
 
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import ORIGIN
 from pdrom.core.store import Condition, check_file, write_text
 from pdrom.core.store.checksum import Checksum, read_checksum
-from pdrom.core.yamlfile import ConfigModel, describe
+from pdrom.core.yamlfile import ConfigModel
 from study.artifact import paths
 from study.pipeline.plan import Plan
-from study.pipeline.scenes import scene_names
 
 LARGE = ".h5"
 _ENVIRONMENT = ("pdrom_version", "python_version", "library_versions")
@@ -71,9 +68,8 @@ def write_manifest(plan: Plan, options: Iterable[str]) -> None:
     """Write the manifest of a study after a successful run."""
     environments: dict[str, dict[str, str]] = {}
     files = {}
-    for path in sorted(study_files(plan)):
-        checksum = read_checksum(path)
-        if checksum is not None:
+    for path in sorted(plan.own_files):
+        if checksum := read_checksum(path):
             inside = os.path.relpath(path, plan.results)
             files[inside] = _entry(Path(path), checksum, environments)
     made = Manifest(options=tuple(options), environments=environments, files=files)
@@ -88,37 +84,8 @@ def read_manifest(results: str) -> Manifest:
         raise StorageError(f"{path}: damaged, its content and its checksum differ")
     try:
         return Manifest.model_validate_json(path.read_text(encoding="utf-8"))
-    except (ValidationError, UnicodeDecodeError) as error:
-        fault = describe(error, Manifest) if isinstance(error, ValidationError) else error
-        raise StorageError(f"{path}: {fault}") from error
-
-
-def study_files(plan: Plan) -> Iterator[str]:
-    """Existing result files of a study, without logs, hidden files and files of other studies.
-
-    A file outside the plan is included if it may have been requested on the command line.
-    """
-    yield from (path for path in plan.own_files if Path(path).is_file())
-    for folder, below, names in os.walk(plan.results):
-        if folder == plan.results:
-            below[:] = [name for name in below if name not in ("logs", "studies")]
-        visible = [f"{folder}/{name}" for name in names if not name.startswith(".")]
-        yield from asked_for(visible, plan)
-
-
-def asked_for(found: Iterable[str], plan: Plan) -> Iterator[str]:
-    """Yield those of the paths ``found`` that a target on the command line may have requested.
-
-    They fit a path pattern of results, are not in the plan, their scene and method exist, and no
-    checksum says that they are files of another path.
-    """
-    scenes, methods = set(scene_names(plan.study.root)), {*plan.study.methods, ""}
-    for path in sorted({*found} - plan.own_files):
-        told = read_checksum(path)
-        if told is None or told.file in ("", path):
-            known = [labels for _, labels in paths.labels_in(path, plan.results)]
-            if any(w.get("scene") in scenes and w.get("method", "") in methods for w in known):
-                yield path
+    except ValueError as error:
+        raise StorageError(f"{path}: no manifest of this version of pdrom") from error
 
 
 def _entry(path: Path, checksum: Checksum, environments: dict[str, dict[str, str]]) -> Entry:

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from pdrom.core.errors import PdromError, StorageError
 from study.artifact.paths import MANIFEST
 from study.artifact.reads import Every
-from study.pipeline.manifest import Entry, asked_for, read_manifest
+from study.pipeline.manifest import Entry, read_manifest
 from study.pipeline.plan import Job
 from study.pipeline.unfit import Checked
 from study.tables import declared
@@ -44,9 +44,8 @@ def verify_files(subject: Subject) -> Status:
         return Status.DIFFERS if there else Status.MISSING
     entries = {os.path.normpath(Path(subject.results, name)): e for name, e in listed.items()}
     own = subject.plan.own_files
-    ours = own | set(asked_for(entries, subject.plan))
     paths = [*entries, *sorted(own - set(entries))]
-    found = {path: _fault(path, entries.get(path), path in ours) for path in paths}
+    found = {path: _fault(path, entries.get(path), path in own) for path in paths}
     faults = {path: fault for path, fault in found.items() if fault}
     other: list[str] = []
     for job in chain.from_iterable(subject.plan.fixed.values()):
@@ -57,8 +56,7 @@ def verify_files(subject: Subject) -> Status:
     checked.distrust(path for path, fault in faults.items() if fault in (DAMAGED, OTHER))
     checked.save()
     for path, fault in list(faults.items())[:SHOWN]:
-        command = subject.command(*{path} - own)  # a run makes files beside the study if asked for
-        say(f"{path}: {fault}" + ("" if fault == FOREIGN else f"; run {command}"))
+        say(f"{path}: {fault}" + ("" if fault == FOREIGN else f"; run {subject.command()}"))
     if len(faults) > SHOWN:
         say(f"and {len(faults) - SHOWN} more; finish the study by {subject.command()}")
     count = len({*paths, *faults})

@@ -62,13 +62,10 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             made = sums.new_checksum(sums.digest_of(temporary), target.name, target)
             checksum.write_bytes(made.content)
             _bring_to_disk(checksum)
-            _rename(temporary, checksum, target)
-        else:
-            os.replace(temporary, target)
-            place = checksum_path(target)
-            content = place.read_bytes() if place.is_file() else b""
-            if sums.Checksum.parse(content).content == content:
-                place.unlink()  # checksum of the file that was just replaced
+            # the checksum first: a process killed in between leaves no result without a checksum,
+            # but one that is missing or does not match it, which the next run makes again
+            os.replace(checksum, checksum_path(target))
+        os.replace(temporary, target)
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
     finally:
@@ -136,26 +133,6 @@ def _runs(process: int) -> bool:
 def _bring_to_disk(path: Path) -> None:
     with open(path, "rb") as handle:
         os.fsync(handle.fileno())
-
-
-def _rename(temporary: Path, checksum: Path, target: Path) -> None:
-    """Rename the ``temporary`` result and its ``checksum`` file to their names, the checksum first.
-
-    If the process is killed in between, the result is missing, or an older one that does not match
-    the checksum: the next run makes it again. If the result were renamed first, it would be left
-    without a checksum. If the second renaming fails, the older result gets its checksum back.
-    """
-    place = checksum_path(target)
-    previous = place.read_bytes() if place.is_file() else None
-    os.replace(checksum, place)
-    try:
-        os.replace(temporary, target)
-    except BaseException:
-        if previous is None:
-            place.unlink()
-        else:
-            place.write_bytes(previous)
-        raise
 
 
 def write_text(text: str, path: str | os.PathLike[str], with_checksum: bool = True) -> None:

@@ -227,12 +227,8 @@ def move_aside(path: str | os.PathLike[str]) -> str:
     """Rename ``path``, also a folder or link, to ``NAME.damaged``; return words that say so."""
     path = Path(path)
     aside, checksum = path.with_name(f"{path.name}.damaged"), checksum_path(path)
-    while os.path.lexists(aside) and (aside.is_dir() or path.is_dir()):
-        aside = aside.with_name(f"{aside.name}.damaged")
     try:
         os.replace(path, aside)
-        if checksum.is_dir():
-            checksum.rename(aside.with_name(f".{aside.name}{CHECKSUM_SUFFIX}"))
         checksum.unlink(missing_ok=True)
     except OSError as error:
         return f"; delete it, it cannot be renamed ({reason(error)})"

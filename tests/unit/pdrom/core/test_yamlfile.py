@@ -1,7 +1,7 @@
 """YAML: plain, without repeated keys, and faults that name file, key and value; long names."""
 
 import pytest
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import (
@@ -19,16 +19,12 @@ from study.artifact.paths import Place
 from study.pipeline.commandline import CommandLine
 
 
-class Inner(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
+class Inner(ConfigModel):
     size: int
     kind: str = "a"
 
 
-class Outer(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
+class Outer(ConfigModel):
     name: str
     inner: Inner
     optional: Inner | None = None

@@ -20,28 +20,16 @@ def test_what_is_filled_in_is_not_looked_at():
     assert filled("a{{X}}b{{Y}}", {"X": "{{Y}}", "Y": "}}"}) == "a{{Y}}b}}"
 
 
-def test_no_title_ends_the_script_and_scenes_are_named_in_order(tmp_path):
-    file = tmp_path / "live" / "one.js"
-    write_text(
-        'pdromLive({"format":1,"scene":"one","title":"A </script> \\"b\\"","more":0});\n', file
-    )
-    without = file.with_name("two.js")  # a scene of which the study has no models
-    write_text('pdromLive({"format":1,"scene":"two","title":"B","models":[]});\n', without)
-    text = write_page(tmp_path, [file, without]).read_text("utf-8")
-    assert '[{"scene":"one","title":"A \\u003c/script> \\"b\\"","file":"live/one.js"}]' in text
-    assert text.count("</script>") == 5
-
-
-@pytest.mark.parametrize("content", ["", "pdromLive({});", 'pdromLive({"format":2,"scene":"x"});'])
-def test_a_file_without_models_and_a_damaged_one_are_named(content, tmp_path):
-    file = tmp_path / "other.js"
-    write_text(content, file)
-    with pytest.raises(StorageError, match=r"other\.js: no models for the page"):
-        write_page(tmp_path, [file])
-    file.write_text("damaged", encoding="utf-8")
-    with pytest.raises(StorageError, match=r"other\.js(?!: no models)"):
-        write_page(tmp_path, [file])
-    assert not (tmp_path / "live.html").exists()
+def test_scenes_with_models_are_named_in_order_and_a_damaged_file_is_refused(tmp_path):
+    one, without, two = (tmp_path / "live" / f"{name}.js" for name in ("one", "without", "two"))
+    for file in (one, two):
+        write_text(f'pdromLive({{"format":1,"scene":"{file.stem}","more":0}});\n', file)
+    write_text('pdromLive({"format":1,"scene":"without","models":[]});\n', without)
+    text = write_page(tmp_path, [one, without, two]).read_text("utf-8")
+    assert '[{"scene":"one","file":"live/one.js"},{"scene":"two","file":"live/two.js"}]' in text
+    two.write_text("damaged", encoding="utf-8")
+    with pytest.raises(StorageError, match=r"two\.js"):
+        write_page(tmp_path, [one, two])
 
 
 def write_sheet(folder: Path) -> Path:
@@ -168,7 +156,7 @@ LIFTED = """
   const layer = drawing.add(new pdromDrawing.Layer({ triangles: Uint32Array.of(0, 1, 2), n: 3 }));
   const B = new Float32Array(3 * size), z = new Float32Array(3 * size);
   for (let v = 0; v < 3; v++) B[size * v + size - 1 - v] = z[3 * (size - 1 - v) + v] = 1;
-  layer.lifted(B, size);
+  layer.lifted(B, size, (out) => out.set([1, 0, 0, 0, 1, 0, 0, 0, 1]));
   layer.move(z);
   drawing.camera.look([0, 0, 0], 2);
   drawing.draw();

@@ -17,7 +17,6 @@ from study.experiments.subspaces import online
 from study.experiments.timing import scaling
 from study.figures.kit.declaration import declarations
 from study.pipeline.folders import Folders
-from study.pipeline.manifest import study_files
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study, labels_of
 from study.tables import declared
@@ -164,30 +163,3 @@ def test_an_edited_mesh_has_another_checksum(tmp_path: Path, experiment) -> None
     assert before == content()
     (root / "config" / "scenes" / MESH).write_text(SQUARE.replace("v 1 0 1", "v 1 0 2"))
     assert content() != before
-
-
-def test_files_of_the_study_and_what_was_asked_for_beside_them(tmp_path, monkeypatch):
-    smallest = Plan(Study(CONFIG | {"scenes": ["bend_fall"]}, ROOT))
-    monkeypatch.chdir(tmp_path)
-    own = [
-        paths.TABLE.at("results", name="claims"),
-        paths.FIGURE_PICTURE.at("results", name="ladder"),
-        paths.TRAIN.at("results", scene="bend_fall"),
-        paths.PAPER_INPUT.at("results", name="macros.tex"),
-        "results/machine.json",
-        "paper/main.pdf",
-        "paper/supplement.pdf",
-    ]
-    asked_for = [paths.TRAIN.at("results", scene="spring_oop")]
-    others = [
-        paths.TRAIN.at("results", scene="no_such_scene"),
-        paths.RERUNS.at("results", scene="bend_fall", group="bending", method="no-such-method"),
-        paths.TRAIN.at("results/studies/tiny", scene="bend_fall"),
-        "results/logs/fom/spring_oop.log",
-        "results/tables/old.csv",
-        "results/notes.txt",
-    ]
-    for name in (*own, *asked_for, *others):
-        Path(name).parent.mkdir(parents=True, exist_ok=True)
-        Path(name).touch()
-    assert sorted(study_files(smallest)) == sorted([*own, *asked_for])
