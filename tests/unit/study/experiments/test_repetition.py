@@ -61,15 +61,6 @@ def test_drawn_frames_are_stored_ones_in_order(sheet):
     assert not np.array_equal(drawn(data, 1), drawn(data, 2))
 
 
-def test_other_training_frames_are_another_basis(short):
-    asked = Repetitions(repetitions=2)
-    one, other = short.repeat(BLOCK, [3, 999], "training", asked)
-    assert one["gain"] != other["gain"]
-    assert abs(one["error"] - other["error"]) > 1e-3 * one["error"]
-    assert short.repeat(BLOCK, [3], "training", asked) == [one, other]
-    assert short.full.scene.config.frames == END
-
-
 def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
     scene, reference, data = sheet
     whole = ReducedRuns("spring", data, Yardstick(scene, reference), END)
