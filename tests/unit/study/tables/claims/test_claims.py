@@ -201,7 +201,7 @@ def test_a_share_of_rows_must_agree_and_ratios_near_the_limit_decide_nothing(
     compare, threshold, share, margin, expected
 ):
     test = rule("local_share", compare, threshold, share=share, margin=margin, **COMPILED)
-    outcome = verdicts.evaluate(test, tables())
+    outcome = verdicts.Outcome(test, tables())
     assert outcome.verdict == expected
     assert outcome.measured == "0.5 to 0.75"
 
@@ -209,7 +209,7 @@ def test_a_share_of_rows_must_agree_and_ratios_near_the_limit_decide_nothing(
 def test_a_condition_breaks_the_answer_down():
     for threshold, margin, told in ((0.6, 1.0, True), (0.6, 1.6, True), (0.5, 1.0, False)):
         test = rule("local_share", ">=", threshold, margin=margin, by="scene", **COMPILED)
-        condition = verdicts.evaluate(test, tables()).condition
+        condition = verdicts.Outcome(test, tables()).condition
         assert ("a 1 of 1, b 0 of 1" in condition) == told == bool(condition)
         assert ("1 of 2 within a factor 1.6" in condition) == (margin == 1.6)
 
