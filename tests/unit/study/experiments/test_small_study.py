@@ -197,6 +197,7 @@ def test_contributions_are_forces_and_energies_of_the_run(array, table, mesh):
 
 def test_more_iterations_approach_the_converged_run(table):
     rows = table(paths.ITERATIONS)
+    rows = rows[rows.vertices == rows.vertices.max()]  # of the own mesh
     plain = rows[rows.window == 0].sort_values("iterations")
     mixed = rows[rows.window == 5].set_index("iterations").error_converged
     assert plain.iterations.tolist() == [1, 2, 5, 10, 20, 60]
