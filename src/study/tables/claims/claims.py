@@ -332,17 +332,12 @@ def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
     timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),
 )
 def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, kind of verdict (`PARTS`) and variation of the tests that decide it."""
-    return sensitivity_rows(load_claims(rules, added), tables)
-
-
-def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
     """One row per claim, kind of verdict (`PARTS`) and variation of the tests that decide it.
 
     A variation is omitted if a test has no rows; of sizes, splits, scenes, also if no row changes.
     """
     made = []
-    for claim, rule in rules.items():
+    for claim, rule in load_claims(rules, added).items():
         for part in PARTS:
             tests = [test for test in getattr(rule, part) if test.decides]
             if not tests:

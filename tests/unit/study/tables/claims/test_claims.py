@@ -462,13 +462,11 @@ ERRORS = frame(
 SHARES = frame("scene local_share", ("a", 0.75), ("b", 0.5)).assign(implementation="compiled")
 
 
-def made(**rule) -> pd.DataFrame:
-    """Variations of a claim with this test, published and beyond."""
-    test = {"what": "w", "metric": "reconstruction_error", "compare": ">=", "threshold": 0.5}
-    tests = (validate(TestRule, test | rule, "test"),)
-    rules = {"C1": ClaimRule.model_construct(published=tests, beyond=tests)}
-    tables = {"reconstruction_error": ERRORS, "local_share": SHARES}
-    rows = verdicts.sensitivity_rows(rules, tables)
+def made(path, **rule) -> pd.DataFrame:
+    """Variations of a claim with this published test."""
+    test = {"metric": "reconstruction_error", "threshold": 0.5, "margin": None}
+    path.write_text(yaml.safe_dump({"C1": claim(test | rule)}))
+    rows = claims_sensitivity(path, {}, reconstruction_error=ERRORS, local_share=SHARES)
     assert set(rows.part) == set(PARTS)
     return rows[rows.part == "published"]
 
@@ -492,8 +490,8 @@ def made(**rule) -> pd.DataFrame:
         ({"where": {"split": ["test", "train"]}}, "splits", {"train": DEPENDS}),
     ],
 )  # fmt: skip
-def test_verdicts_under_other_rules(changes, varied, expected):
-    rows = made(**changes)
+def test_verdicts_under_other_rules(tmp_path, changes, varied, expected):
+    rows = made(tmp_path / "claims.yaml", **changes)
     chosen = rows[rows.varied == varied]
     assert dict(zip(chosen.variation, chosen.verdict, strict=True)) == expected
     unchanged = HOLDS if "metric" in changes else DEPENDS
@@ -503,7 +501,7 @@ def test_verdicts_under_other_rules(changes, varied, expected):
 
 def test_every_test_says_what_it_found_and_those_that_decide_give_the_by_variation():
     tables = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
-    assert verdicts.sensitivity_rows(load_claims(PATH), tables).empty
+    assert claims_sensitivity(PATH, {}, **tables).empty
     shares = frame("scene local_share", ("a", 0.2), ("b", 0.8), ("c", 0.9))
     tables["local_share"] = shares.assign(implementation="compiled")
     outcomes = claims_tests(PATH, {}, **tables)
