@@ -136,3 +136,17 @@ def projected(group, f: np.ndarray) -> np.ndarray:
     """Projections (e, rows, 3) of the group's elements at F^T = f."""
     y = np.concatenate([np.zeros((len(f), 1, 3)), f], axis=1).reshape(-1, 3)
     return group.project(y).reshape(f.shape)
+
+
+def perturbed_runs() -> pd.DataFrame:
+    """Differences of perturbed runs: scene a exceeds 1e-3 in frame 2 (held out: 1), b never."""
+    values = {
+        ("a", "1e-10", 1): [0.0, 1e-9, 5e-3, 1e-9],
+        ("a", "1e-10", 2): [0.0, 2e-9, 1e-9, 1.0],
+        ("a", "1e-06", 1): [1.0] * 4,
+        ("a", "heldout", 1): [1e-12, 1.0, 1.0, 1.0],
+        ("b", "1e-10", 1): [1e-12, 3e-12, 2e-12, 1e-12],
+        ("b", "heldout", 1): [1e-12] * 4,
+    }
+    rows = [(*key, number, v) for key, own in values.items() for number, v in enumerate(own)]
+    return frame("scene perturbation seed frame relative_difference", *rows)

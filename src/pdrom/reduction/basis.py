@@ -108,8 +108,9 @@ def compute_basis(
 ) -> Basis:
     """Compute the POD basis of training snapshots.
 
-    Parameters
-    ----------
+    Raises SnapshotError for fewer than two snapshots, a wrong shape, NaN or Inf, or mass weighting
+    with a zero mass.
+
     snapshots : (n, e p, 3) projections of e elements with p rows each
     row_mass : (e p,) kg, used by mass weighting
     roundoff : Frobenius norm of the rounding errors in ``snapshots``
@@ -118,11 +119,6 @@ def compute_basis(
         centring "mean-in-modes": it adds the first snapshot to every mode, so that the span of the
         modes depends on their signs.
     spec : weighting, centring and layout
-
-    Raises
-    ------
-    SnapshotError
-        Fewer than two snapshots, a wrong shape, NaN or Inf, or mass weighting with a zero mass.
     """
     _check(snapshots, row_mass, rows_per_element, spec)
     require_finite("round-off of the snapshots", np.array([roundoff]), SnapshotError)

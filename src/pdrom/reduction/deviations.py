@@ -11,15 +11,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from pdrom.model import metrics
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.energy import STRIDE, EnergyScale
-from pdrom.model.metrics import (
-    BLOCK,
-    relative_deformation,
-    rest_size,
-    shape_differences,
-    trajectory_error,
-)
 from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, displacement_norms, rerun, step_norms
@@ -70,7 +64,9 @@ class Yardstick:
     @cached_property
     def deformed(self) -> np.ndarray:
         """Norm (F,) m of the difference in shape from the rest shape in each frame."""
-        return shape_differences(self.scene.mesh.points, self.reference[1:], self.scene.masses)
+        return metrics.shape_differences(
+            self.scene.mesh.points, self.reference[1:], self.scene.masses
+        )
 
     @cached_property
     def scale(self) -> EnergyScale:
@@ -127,7 +123,7 @@ class Yardstick:
         side: sqrt(N) times that side.
         """
         mesh = self.scene.mesh
-        size = rest_size(mesh.points, self.scene.masses)
+        size = metrics.rest_size(mesh.points, self.scene.masses)
         norm = mesh.extent * float(np.sqrt(mesh.vertices))
         return {"extent_norm": norm, "rest_norm": size}
 
@@ -141,15 +137,15 @@ class Yardstick:
         difference, shapes = self.differences(positions[: end + 1])
         size = self.units["rest_norm"]
         return (
-            trajectory_error(difference, self.displacement[:end]),
-            relative_deformation(shapes, self.deformed[:end], size),
+            metrics.trajectory_error(difference, self.displacement[:end]),
+            metrics.relative_deformation(shapes, self.deformed[:end], size),
         )
 
     def differences(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Norms (F',) m of differences in position and shape; ``positions`` (F' + 1, N, 3) m."""
         blocks, masses = _blocks(positions, self.reference), self.scene.masses
         apart = [np.linalg.norm((q - p)[1:], axis=(1, 2)) for q, p in blocks]
-        shapes = [shape_differences(q[1:], p[1:], masses) for q, p in blocks]
+        shapes = [metrics.shape_differences(q[1:], p[1:], masses) for q, p in blocks]
         return np.concatenate(apart), np.concatenate(shapes)
 
     def deviations(self, outcome: Rerun) -> dict[str, np.ndarray]:
@@ -183,8 +179,6 @@ def errors_within(
 
     An error is None if the run ended earlier or the full-order run lacks the quantity.
 
-    Parameters
-    ----------
     run, reference : per-frame series from `Yardstick.deviations` and `Yardstick.series`
     extent_norm, rest_norm : as `Yardstick.units`
     """
@@ -202,13 +196,13 @@ def errors_within(
 
     found = (
         error_within(run["difference"], displacement, end),
-        relative_deformation(shape[:end], reference["deformed"][:end], rest_norm),
+        metrics.relative_deformation(shape[:end], reference["deformed"][:end], rest_norm),
         over_extent(run["difference"]),
         over_extent(shape),
         error_within(run["step_difference"], reference["step"], end),
         drift,
         error_within(run["difference_converged"], reference["displacement_converged"], end),
-        relative_deformation(
+        metrics.relative_deformation(
             run["shape_difference_converged"][:end],
             reference["deformed_converged"][:end],
             rest_norm,
@@ -220,18 +214,16 @@ def errors_within(
 def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> float | None:
     """Relative error over the first ``end`` frames; None if the run has fewer or nothing moved.
 
-    Parameters
-    ----------
     difference : (F',) m, norms of the difference between the run and the full-order run
     displacement : (F,) m, norms of the displacement of the full-order run
     """
     if len(difference) < end:
         return None
-    return trajectory_error(difference[:end], displacement[:end])
+    return metrics.trajectory_error(difference[:end], displacement[:end])
 
 
 def _blocks(positions: np.ndarray, reference: np.ndarray) -> list[tuple[Any, Any]]:
     """Split both runs into parts of `BLOCK` frames, each with the state before its first frame."""
-    starts = range(0, max(len(positions) - 1, 1), BLOCK)
-    ends = (min(start + BLOCK + 1, len(positions)) for start in starts)
+    starts = range(0, max(len(positions) - 1, 1), metrics.BLOCK)
+    ends = (min(start + metrics.BLOCK + 1, len(positions)) for start in starts)
     return [(positions[s:e], reference[s:e]) for s, e in zip(starts, ends, strict=True)]

@@ -59,8 +59,6 @@ def rerun(
 ) -> Rerun:
     """Run ``loop`` from ``start``; compare it with the full-order run ``reference`` of ``scene``.
 
-    Parameters
-    ----------
     reference : (F + 1, N, 3) m; None compares with nothing
     limit : the run ends if its bounding box exceeds this multiple of that at rest
     positions : function that maps the unknowns of ``loop`` to vertex positions (N, 3) m

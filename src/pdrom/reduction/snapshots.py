@@ -101,8 +101,6 @@ def collect(
 
     Raises SnapshotError if a set is empty, lacks a training frame, or contains NaN or Inf.
 
-    Parameters
-    ----------
     training_run, heldout_run : files of the two full-order runs
     masses : (N,) kg, masses of the vertices
     train : (n,) numbers of the training frames, ascending

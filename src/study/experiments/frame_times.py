@@ -5,7 +5,7 @@ scene is timed twice: speed-ups as small as the difference between these two tim
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -82,27 +82,19 @@ class Options(ConfigModel):
     projection_methods: dict[str, MethodSpec]
 
 
-@dataclass(frozen=True)
-class TimedScene:
-    """A scene whose full-order run (twice, once as a control) and labelled ``models`` are timed."""
+Models = list[tuple[dict[str, Any], ProjectionModel | SubspaceModel]]
 
-    scene: Scene
-    frames: int
-    models: list[tuple[dict[str, Any], ProjectionModel | SubspaceModel]] = field(
-        default_factory=list
-    )
 
-    def variants(self) -> Iterator[Variant]:
-        """Yield the step loops to time: full order, full order as a control, and reductions."""
-        scene, config = self.scene, self.scene.config
-        frames = min(self.frames, config.frames)
-        common = {"scene": config.name, "vertices": scene.mesh.vertices, "frames": config.frames}
-        for role in (FULL, CONTROL):
-            yield variant(scene, frames, {**common, "role": role})
-        for own, model in self.models:
-            sizes = {"group": "all", "r": model.elements_evaluated(scene)}
-            labels = {**common, "role": REDUCED, **sizes, **own}
-            yield model_variant(labels, scene, model, frames)
+def variants(scene: Scene, models: Models, frames: int) -> Iterator[Variant]:
+    """Yield what is timed of ``scene``: full order, the same as a control, labelled ``models``."""
+    config, frames = scene.config, min(frames, scene.config.frames)
+    common = {"scene": config.name, "vertices": scene.mesh.vertices, "frames": config.frames}
+    for role in (FULL, CONTROL):
+        yield variant(scene, frames, {**common, "role": role})
+    for own, model in models:
+        sizes = {"group": "all", "r": model.elements_evaluated(scene)}
+        labels = {**common, "role": REDUCED, **sizes, **own}
+        yield model_variant(labels, scene, model, frames)
 
 
 @experiment(
@@ -122,31 +114,29 @@ class TimedScene:
 def frame_times(settings: Options, times: File, seconds: File, **files: list[File]) -> None:
     """Run the timing processes one by one; write times of frames, and of selecting the samples."""
     asked = settings.frame_times
-    scenes: dict[str, TimedScene] = {}
-    for named, file in zip(settings.timed_scenes, files["meshes"], strict=True):
-        scene = Scene.build(named.config, load_mesh(file.path))
-        scenes[named.scene] = TimedScene(scene, asked.frames)
+    meshes = zip(settings.timed_scenes, files["meshes"], strict=True)
+    scenes = {own.scene: Scene.build(own.config, load_mesh(mesh.path)) for own, mesh in meshes}
+    models: dict[str, Models] = {name: [] for name in scenes}
     rows = []
     given = (files[name] for name in ("bases", "samplings", "snapshots"))
     for own, basis, sampling, data in zip(settings.projection_cases, *given, strict=True):
         spec = settings.projection_methods[own.method]
         reduction = load_reduction(load_basis(basis.path), sampling.path, spec, r=own.r)
         labels = own.model_dump() | {"position_basis": "full"}
-        scenes[own.scene].models.append((labels, ProjectionModel(own.group, reduction)))
+        models[own.scene].append((labels, ProjectionModel(own.group, reduction)))
         known = load_snapshots(data.path)
         before = process_time()
         select(basis_of(known, spec), spec, own.r)
         rows.append((*own.model_dump().values(), process_time() - before))
     for case, file in zip(settings.subspace_cases, files["subspaces"], strict=True):
         wanted, held = case.model_dump(exclude={"scene"}), load_models(file.path)
-        scenes[case.scene].models.extend(each for each in held if each[0] == wanted)
+        models[case.scene] += [each for each in held if each[0] == wanted]
     # time all models in the file of a large scene, also if ``timed_scenes`` lists this scene, too
     for named, file in zip(settings.large_scenes, files["large"], strict=True):
         if named.scene not in scenes:
-            scene = Scene.build(named.config, named.config.mesh.build(Path()))
-            scenes[named.scene] = TimedScene(scene, asked.frames)
-        scenes[named.scene].models.extend(load_models(file.path))
-    timed = [scene.variants for scene in scenes.values()]
+            scenes[named.scene] = Scene.build(named.config, named.config.mesh.build(Path()))
+        models.setdefault(named.scene, []).extend(load_models(file.path))
+    timed = [partial(variants, scenes[name], models[name], asked.frames) for name in scenes]
     table = pd.DataFrame(in_processes(timed, asked), columns=COLUMNS)
     write_table(table.astype({"k": "Int64", "r": "Int64"}), times.path)
     write_table(pd.DataFrame(rows, columns=SECONDS_COLUMNS), seconds.path)

@@ -161,9 +161,7 @@ def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
     """Draw as many of all snapshots of ``data`` as are for training, n; result: (n, e p, 3)."""
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
-    chosen = chosen[np.argsort(frames[chosen])]
-    count = len(data.train)
-    return np.stack([data.train[i] if i < count else data.test[i - count] for i in chosen])
+    return np.concatenate([data.train, data.test])[chosen[np.argsort(frames[chosen])]]
 
 
 class Cell(ConfigModel):

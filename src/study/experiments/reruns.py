@@ -256,9 +256,8 @@ def _rows(scene: Scene, models: Models) -> Iterator[dict[str, Any]]:
 
     A model of a basis with too few modes is None; its row has no results.
     """
-    nothing = np.zeros((scene.config.frames + 1, *scene.mesh.points.shape))
     loop, start = scene.stepper(track_objective=False), scene.initial_state()
-    full = rerun(scene, loop, start, nothing, BLOWUP_EXTENT)
+    full = rerun(scene, loop, start, None, BLOWUP_EXTENT)
     own = Yardstick(scene, full.positions)
 
     def row(labels: dict[str, Any], outcome: Rerun) -> dict[str, Any]:

@@ -309,14 +309,10 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
 
 
 def _reductions(
-    scene: Scene,
-    projections: np.ndarray,
-    roundoff: np.ndarray,
-    spec: MethodSpec,
-    asked: Sequence[int],
+    scene: Scene, p: np.ndarray, roundoff: np.ndarray, spec: MethodSpec, asked: Sequence[int]
 ) -> list[Reduction]:
     """Reductions of the first group to r modes (at most the basis's rank) for each r ``asked``."""
     noise = float(np.linalg.norm(roundoff))
-    basis = group_basis(scene.groups[0], scene.masses, projections, noise, spec)
+    basis = group_basis(scene.groups[0], scene.masses, p, noise, spec)
     sizes = sorted({min(r, basis.rank) for r in asked})
     return list(reductions(basis, spec, sizes).values())

@@ -120,12 +120,11 @@ def iterations(
     per_step = 3 * rows_per_element if rows == "element" else 1
     if len(entries) < per_step or entries.min() < 0 or entries.max() >= len(V):
         raise StorageError(f"{len(entries)} sampled entries do not fit a basis of {len(V)} rows")
-    residual_of = _joint_residual if rows == "joint" else _shared_residual
     per_element = 3 * rows_per_element
     length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # residual entries per sample
     steps = []
     for k in range(min(count, len(entries) // per_step, V.shape[1])):
-        residual = residual_of(V, entries[: k * per_step], k)
+        residual = _residual(V, entries[: k * per_step], k, rows == "joint")
         norms = np.linalg.norm(residual.reshape(-1, length), axis=1)
         picked = entries[: (k + 1) * per_step : per_step] // per_element
         magnitude = norms.reshape(-1, per_element // length).max(axis=1)
@@ -134,16 +133,13 @@ def iterations(
     return steps
 
 
-def _shared_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
-    """Residual of mode k, fitted by earlier modes at ``entries`` with one set of coefficients."""
+def _residual(V: np.ndarray, entries: np.ndarray, k: int, joint: bool = False) -> np.ndarray:
+    """Residual of mode k, fitted by earlier modes at ``entries``; ``joint``: x, y, z separately."""
+    if joint:
+        parts = [_residual(V[axis::3], entries // 3, k) for axis in range(3)]
+        return np.stack(parts, axis=1).ravel()
     coefficients = np.linalg.lstsq(V[entries, :k], V[entries, k], rcond=None)[0]
     return V[:, k] - V[:, :k] @ coefficients
-
-
-def _joint_residual(V: np.ndarray, entries: np.ndarray, k: int) -> np.ndarray:
-    """Residual of mode k, fitted by earlier modes at sampled rows, separately for x, y and z."""
-    axes = np.moveaxis(V.reshape(-1, 3, V.shape[1]), 1, 0)
-    return np.stack([_shared_residual(own, entries // 3, k) for own in axes], axis=1).ravel()
 
 
 @figure(

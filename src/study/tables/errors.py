@@ -19,18 +19,8 @@ import pandas as pd
 from pdrom.reduction.basis import load_basis
 from study.artifact import paths
 from study.artifact.reads import EachOf, Every, TableOf
-from study.tables.kit import declaration
+from study.tables.kit import declaration, results
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, text
-from study.tables.kit.results import (
-    FAILED,
-    ITERATIONS,
-    REFERENCE,
-    RESAMPLES,
-    SEED,
-    families,
-    joined,
-    judged_runs,
-)
 
 _SMALL = "empty at round-off level"
 # Errors of approximations amplify rounding errors less than runs do, 7e-4 at most was measured.
@@ -78,7 +68,7 @@ def singular_values(bases: list[paths.File]) -> pd.DataFrame:
 )
 def reconstruction_error(parts: list[paths.File]) -> pd.DataFrame:
     """Rows of all files ``parts``, one file per scene, group and method, in order."""
-    return joined(parts)
+    return results.joined(parts)
 
 
 @table(
@@ -94,7 +84,7 @@ def reconstruction_error(parts: list[paths.File]) -> pd.DataFrame:
 def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
     """Relative difference of perturbed and unperturbed runs: largest over seeds, for each frame."""
     keys = ["scene", "perturbation", "frame"]
-    rows = joined(parts).groupby(keys, sort=False, as_index=False)
+    rows = results.joined(parts).groupby(keys, sort=False, as_index=False)
     return rows["relative_difference"].max()
 
 
@@ -113,14 +103,14 @@ def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
         # modes made of round-off, and thus their gain (error amplification), depend on the machine
         replace(*shared("gain"), compared="skipped"),
         *shared("frames finite blowup_frame"),
-        REFERENCE,
+        results.REFERENCE,
         number("relative_error", "error of the positions over all frames up to the horizon"),
     ),
     reads={"parts": Every(paths.NOISE)},
 )
 def noise(parts: list[paths.File]) -> pd.DataFrame:
     """Rows of files ``parts``, one per scene and group: runs with bases made of round-off."""
-    return joined(parts).assign(reference=ITERATIONS)
+    return results.joined(parts).assign(reference=results.ITERATIONS)
 
 
 @table(
@@ -130,7 +120,7 @@ def noise(parts: list[paths.File]) -> pd.DataFrame:
         text("varied", "training (frames), start; held-out motions, with the number trained on"),
         integer("repetitions", "runs; their range encloses the median of all but by 2^(1 - n)"),
         integer("ended", "runs that ended early, with an infinite error", compared="error"),
-        REFERENCE,
+        results.REFERENCE,
         number("error_median", "median of the errors of the positions before the horizon"),
         *declaration.extremes("error"),
         number("gain_median", "median of the gains"),
@@ -145,7 +135,7 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
     The median of any distribution lies outside the range of n independent draws with probability
     2^(1 - n): five draws enclose it with probability 15/16.
     """
-    rows = joined(parts)
+    rows = results.joined(parts)
     if rows.empty:
         return rows
     cells = rows.groupby(_CELL, sort=False)
@@ -153,7 +143,7 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
     found = {f"{n}_{end}": (n, how) for n in ("error", "gain") for end, how in ends.items()}
     made = cells.agg(repetitions=("error", "size"), **found)
     made["ended"] = rows.error.isin([float("inf")]).groupby([rows[c] for c in _CELL]).sum()
-    made = made.assign(spread=made.error_high / made.error_low, reference=ITERATIONS)
+    made = made.assign(spread=made.error_high / made.error_low, reference=results.ITERATIONS)
     return made.reset_index()
 
 
@@ -175,7 +165,7 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
         number("error_train", "reconstruction error of the training snapshots"),
         number("error_heldout", "the same of the held-out motion"),
         *shared("finite blowup_frame"),
-        REFERENCE,
+        results.REFERENCE,
         *shared("relative_error_within_horizon"),
         integer("repetitions", "runs trained on other frames, where they were repeated"),
         number("error_median", "median of their errors; inf for a run that ended early"),
@@ -186,7 +176,7 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
 )
 def ladder(parts: list[paths.File]) -> pd.DataFrame:
     """Join the tables in the files ``parts``, one for each scene and group, in their order."""
-    return joined(parts).assign(reference=ITERATIONS)
+    return results.joined(parts).assign(reference=results.ITERATIONS)
 
 
 # Step that changes samples, in table gain_interventions -> (method before it, method after it).
@@ -235,7 +225,7 @@ share = partial(number, compared="share")
         count("failing_after", "pairs whose error after exceeds a tenth"),
         share("error_before", "median of the error before; inf for a run that ended early"),
         share("error_after", "median of the error after"),
-        REFERENCE,
+        results.REFERENCE,
         share("gain_ratio", "median of the gain after over that before"),
         share("error_ratio", "median of the error of the run after over that before"),
         *declaration.interval("error_ratio_low error_ratio_high", share),
@@ -260,7 +250,7 @@ def gain_interventions(
     Errors below the sensitivity floor, by which perturbed runs differ, are raised to it. A run that
     ended early has an infinite error; two such runs are not compared.
     """
-    runs = judged_runs(reruns, reconstruction)
+    runs = results.judged_runs(reruns, reconstruction)
     rows = []
     square = _square(ladder, runs) if len(ladder) else runs[:0].assign(rows_per_element=1)
     for name, before, after, pairs in _steps(runs, square):
@@ -269,7 +259,7 @@ def gain_interventions(
             if len(own):
                 labels = {"step": name, "mesh": mesh, "method_before": before}
                 rows.append({**labels, "method_after": after, **_summary(own)})
-    return pd.DataFrame(rows).assign(reference=ITERATIONS)
+    return pd.DataFrame(rows).assign(reference=results.ITERATIONS)
 
 
 def _steps(
@@ -317,20 +307,21 @@ def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
     # not imported at the top: SciPy's import takes a second, which planning the workflow saves
     from scipy.stats import binomtest
 
-    by_family = pairs.groupby(families(pairs.scene)).error
+    by_family = pairs.groupby(results.families(pairs.scene)).error
     fallen = int((by_family.median() < 1.0).sum())
     values = [own.to_numpy(float) for _, own in by_family]
     # bootstrap of the median error ratio: families of scenes are drawn with replacement
-    drawn = np.random.default_rng(SEED).integers(len(values), size=(RESAMPLES, len(values)))
+    size = results.RESAMPLES, len(values)
+    drawn = np.random.default_rng(results.SEED).integers(len(values), size=size)
     medians = [np.median(np.concatenate([values[i] for i in row])) for row in drawn]
     low, high = np.percentile(medians, [2.5, 97.5], method="inverted_cdf")
-    failing = pairs.error_before > FAILED
+    failing = pairs.error_before > results.FAILED
     return {
         "pairs": len(pairs),
         "scenes": pairs.scene.nunique(),
         "failing": int(failing.sum()),
-        "rescued": int((failing & (pairs.error_after <= FAILED)).sum()),
-        "failing_after": int((pairs.error_after > FAILED).sum()),
+        "rescued": int((failing & (pairs.error_after <= results.FAILED)).sum()),
+        "failing_after": int((pairs.error_after > results.FAILED).sum()),
         "error_before": float(pairs.error_before.median()),
         "error_after": float(pairs.error_after.median()),
         "gain_ratio": float(pairs.gain.median()),

@@ -14,20 +14,9 @@ from pdrom.reduction.deviations import DEVIATIONS, ERRORS, Series, errors_within
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
-from study.experiments.kit.base import Horizon, floor_of, horizons
+from study.experiments.kit.base import TRAIN, Horizon, floor_of, horizons
+from study.tables.kit import results
 from study.tables.kit.declaration import flag, number, shared, table, text
-from study.tables.kit.results import (
-    DEFORMATION,
-    ERROR,
-    ITERATIONS,
-    KEYS,
-    OWN_ERRORS,
-    REFERENCE,
-    TRAIN,
-    joined,
-    timings_in_one_time,
-    trained,
-)
 
 
 @table(
@@ -36,7 +25,7 @@ from study.tables.kit.results import (
         *shared("scene group method position_basis k r frames finite blowup_frame max_extent"),
         *shared("training_residual"),
         *shared("relative_error relative_error_within_horizon deformation_error playback_error"),
-        REFERENCE,
+        results.REFERENCE,
         *shared("error_converged deformation_converged"),
         *shared("reference_error reference_deformation_error"),
         *shared("horizon_frame sensitivity_floor"),
@@ -75,7 +64,7 @@ def reduced_reruns(
     Errors are against the full-order run with the scene's iterations, and also against the
     converged one.
     """
-    references = joined(files["references"])
+    references = results.joined(files["references"])
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
         label = horizon.perturbation if motion == TRAIN else motion
@@ -95,10 +84,10 @@ def reduced_reruns(
             found["playback_error"] = found.scene.map(distance)
             found = pd.concat([found, played], ignore_index=True)
         judged.append(found)
-    judged[0] = _with_times(judged[0], timings_in_one_time(files["timings"], frame_times))
-    made = pd.concat(judged, ignore_index=True).assign(reference=ITERATIONS)
+    judged[0] = _with_times(judged[0], results.timings_in_one_time(files["timings"], frame_times))
+    made = pd.concat(judged, ignore_index=True).assign(reference=results.ITERATIONS)
     return made.merge(
-        references[["scene", "motion", *OWN_ERRORS]], on=["scene", "motion"], how="left"
+        references[["scene", "motion", *results.OWN_ERRORS]], on=["scene", "motion"], how="left"
     )
 
 
@@ -109,8 +98,8 @@ def _played(references: pd.DataFrame, motion: str) -> pd.DataFrame:
         "scene": rows.scene, "group": "all", "method": PLAYBACK, "position_basis": "full",
         "frames": rows.frames, "finite": True, "motion": motion,
         "horizon_frame": rows.horizon_frame, "relative_error": rows.playback_all,
-        "playback_error": rows.playback_error, ERROR: rows.playback_error,
-        DEFORMATION: rows.playback_deformation_error, "error_converged": rows.replay_error,
+        "playback_error": rows.playback_error, results.ERROR: rows.playback_error,
+        results.DEFORMATION: rows.playback_deformation_error, "error_converged": rows.replay_error,
         "deformation_converged": rows.replay_deformation_error,
     })  # fmt: skip
 
@@ -162,7 +151,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     parts = []
     # match rows of subspace models by the size k, as their r is the number of sampled elements
     for inside, left_out in ((False, "k"), (True, "r")):
-        keys, whole = [k for k in KEYS if k != left_out], {"k": "int64"} if inside else {}
+        keys, whole = [k for k in results.KEYS if k != left_out], {"k": "int64"} if inside else {}
         rows, found = (each[(each.position_basis != "full") == inside] for each in (runs, reduced))
         if len(rows):
             found = found[keys + measured].astype(whole)
@@ -185,7 +174,7 @@ FRAGILE = 0.005
         number("stiffness_ratio", "factor on the weights of the reduced groups", compared="exact"),
         *shared("finite blowup_frame max_extent energy_ratio gain group position_basis k"),
         text("experiment", "rerun (of the study) or sweep (a short run)"),
-        REFERENCE,
+        results.REFERENCE,
         *shared("relative_error"),
         text("outcome", f"one of: {', '.join(OUTCOMES)}", compared="error"),
     ),
@@ -215,8 +204,9 @@ def stability(
     reruns = _rerun_rows(files["reruns"], files["subspaces"], reduced_reruns)
     runs = pd.concat([_full_order_rows(files["full_order"]), reruns], ignore_index=True)
     runs = runs.assign(h=runs.scene.map(time_steps), stiffness_ratio=1.0, experiment="rerun")
-    rows = pd.concat([runs, joined(files["sweeps"]).assign(experiment="sweep")], ignore_index=True)
-    return rows.assign(outcome=outcomes(rows, wrong, departure), reference=ITERATIONS)
+    sweeps = results.joined(files["sweeps"]).assign(experiment="sweep")
+    rows = pd.concat([runs, sweeps], ignore_index=True)
+    return rows.assign(outcome=outcomes(rows, wrong, departure), reference=results.ITERATIONS)
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
@@ -255,12 +245,12 @@ def _rerun_rows(
     reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
 ) -> pd.DataFrame:
     """Rows of reduced runs of the training motion; errors cover the frames before the `Horizon`."""
-    local = joined(reruns).assign(position_basis="full", k=np.nan)
-    runs = pd.concat([local, joined(subspaces)], ignore_index=True)
+    local = results.joined(reruns).assign(position_basis="full", k=np.nan)
+    runs = pd.concat([local, results.joined(subspaces)], ignore_index=True)
     runs = runs.drop(columns="relative_error")
-    errors = trained(reduced_reruns)[[*KEYS, "relative_error_within_horizon"]]
+    errors = results.trained(reduced_reruns)[[*results.KEYS, "relative_error_within_horizon"]]
     errors = errors.rename(columns={"relative_error_within_horizon": "relative_error"})
-    return runs.merge(errors, on=KEYS, how="left", validate="one_to_one")
+    return runs.merge(errors, on=results.KEYS, how="left", validate="one_to_one")
 
 
 @table(
@@ -280,4 +270,4 @@ def _rerun_rows(
 )
 def hard_cases(parts: list[File]) -> pd.DataFrame:
     """Rows of the files ``parts``: reductions in scenes with extreme meshes, states, settings."""
-    return joined(parts)
+    return results.joined(parts)

@@ -8,16 +8,8 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every
 from study.experiments.error_budget import FULL_ORDER, PARTS, SPAN
+from study.tables.kit import results
 from study.tables.kit.declaration import flag, integer, number, shared, table, text
-from study.tables.kit.results import (
-    CONVERGED,
-    DEFORMATION,
-    OWN_ERRORS,
-    REFERENCE,
-    THIRD,
-    TRAIN,
-    joined,
-)
 
 MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIONS)}")
 
@@ -35,7 +27,7 @@ MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIO
             "over the norm of the displacement, in all frames",
         ),
         number("affine", "the same, if the best affine motions are taken out", compared="error"),
-        REFERENCE,
+        results.REFERENCE,
         number("replay_error", "position error if the training trajectory is replayed instead"),
         number("replay_deformation_error", "deformation error of the replay"),
         number("full_order_error", "position error of the run with the scene's iterations"),
@@ -47,8 +39,8 @@ MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIO
 )
 def test_trajectories(references: list[File]) -> pd.DataFrame:
     """One row per scene and held-out motion; errors are before the horizon, of converged runs."""
-    rows = joined(references)
-    return rows[rows.motion != TRAIN].assign(reference=CONVERGED)
+    rows = results.joined(references)
+    return rows[rows.motion != results.TRAIN].assign(reference=results.CONVERGED)
 
 
 @table(
@@ -66,7 +58,7 @@ def test_trajectories(references: list[File]) -> pd.DataFrame:
             "elements; sampling: with the sampled ones; run: five local/global iterations; "
             "full_order: the full order with the scene's iterations",
         ),
-        REFERENCE,
+        results.REFERENCE,
         number("error", "position error"),
         *shared("deformation_error"),
         number("added", "deformation error less that of the part before", compared="error"),
@@ -80,17 +72,17 @@ def error_budget(parts: list[File], references: list[File]) -> pd.DataFrame:
 
     Where the reference moves rigidly, ``added`` is that of the position error.
     """
-    rows = joined(parts).assign(reference=CONVERGED)
+    rows = results.joined(parts).assign(reference=results.CONVERGED)
     if rows.empty:
         return rows
-    error = rows[DEFORMATION].fillna(rows.error).fillna(np.inf)
+    error = rows[results.DEFORMATION].fillna(rows.error).fillna(np.inf)
     before = error.shift().where(rows.part != SPAN, 0.0)
     own = rows.part != FULL_ORDER
     with np.errstate(invalid="ignore"):
         added = (error - before).where(own)
     trajectory = pd.Series(np.arange(len(rows)) // len(PARTS), rows.index)
     most = added == added.groupby(trajectory).transform("max")
-    known = joined(references)[["scene", "motion", *OWN_ERRORS]]
+    known = results.joined(references)[["scene", "motion", *results.OWN_ERRORS]]
     rows = rows.assign(added=added).merge(known, "left", ["scene", "motion"])
-    least = rows.reference_deformation_error.fillna(rows.reference_error) / THIRD
+    least = rows.reference_deformation_error.fillna(rows.reference_error) / results.THIRD
     return rows.assign(largest=most & (rows.added > least))

@@ -6,7 +6,6 @@ rules, and replication the verdicts of table claims beside those on other scenes
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -29,24 +28,6 @@ RULES = "config/claims.yaml"
 RERUNS = "reduced_reruns"
 RECORDED = "config/reference/replication/claims.csv"
 MEASURED = [f"{name}{suffix}" for suffix in PARTS.values() for name in ("verdict", "measured")]
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Result of one test.
-
-    verdict : one of `VERDICTS`; "cannot be decided" if there are no values to compare, "depends on
-        the machine" if the verdict rests on ratios of times that are close to the threshold
-    measured : text with the range of the metric's values
-    sentence : text with the number of rows that satisfy the comparison
-    condition : text with this number for each value of the test's column ``by``; empty unless the
-        verdict is "depends" or "depends on the machine"
-    """
-
-    verdict: str
-    measured: str
-    sentence: str
-    condition: str = ""
 
 
 def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
@@ -87,31 +68,40 @@ def answer_of(test: TestRule, values: np.ndarray) -> str:
     return answers.pop() if len(answers) == 1 else MACHINE
 
 
-def evaluate(test: TestRule, tables: Tables) -> Outcome:
-    """Compare the values that ``test`` selects from ``tables`` with the threshold of the test."""
-    rows = values_of(test, tables)
-    values = rows[VALUE].to_numpy(float)
-    if len(values) == 0:
-        why = "nothing to compare in this configuration"
-        where = {k: v for k, v in test.where.items() if k != "r"}
-        if test.metric == "rerun_error" and len(filtered(tables["reduced_reruns"], where)):
-            why = "no size can run, the numerical rank allows none"
-        return Outcome(UNDECIDED, "no data", f"{test.what}: {why}")
-    passed = satisfied(test, values)
-    good, total = int(passed.sum()), len(values)
-    spread = _range(values)
-    sign = "at least" if test.compare == ">=" else "at most"
-    sentence = f"{test.what}: {good} of {total} {sign} {test.threshold:g} (measured {spread})"
-    near = int(close(test, values).sum())
-    beside = f"{near} of {total} within a factor {test.factor:g} of it" if near else ""
-    sentence += f", {beside}" if beside else ""
-    verdict = answer_of(test, values)
-    condition = ""
-    if verdict in (DEPENDS, MACHINE):
-        condition = f"{test.what}, {sign} {test.threshold:g}: {_broken_down(test, rows, passed)}"
-    if verdict == MACHINE:
-        condition += f" (measured {spread}; {beside}, which decides nothing)"
-    return Outcome(verdict, spread, sentence, condition)
+class Outcome:
+    """Result of ``test`` on the values that it selects from ``tables``.
+
+    passed, near : whether each of the ``values`` satisfies the comparison; whether it is a ratio of
+        times that is too close to the threshold to decide
+    verdict : one of `VERDICTS`, by `answer_of`
+    measured : text with the range of the values
+    sentence : text with the number of rows that satisfy the comparison
+    condition : text with this number for each value of the test's column ``by``; empty unless the
+        verdict is "depends" or "depends on the machine"
+    """
+
+    def __init__(self, test: TestRule, tables: Tables) -> None:
+        rows = values_of(test, tables)
+        self.values = values = rows[VALUE].to_numpy(float)
+        self.passed, self.near = satisfied(test, values), close(test, values)
+        self.verdict, self.condition = answer_of(test, values), ""
+        if len(values) == 0:
+            why = "nothing to compare in this configuration"
+            where = {k: v for k, v in test.where.items() if k != "r"}
+            if test.metric == "rerun_error" and len(filtered(tables["reduced_reruns"], where)):
+                why = "no size can run, the numerical rank allows none"
+            self.measured, self.sentence = "no data", f"{test.what}: {why}"
+            return
+        good, total, near = int(self.passed.sum()), len(values), int(self.near.sum())
+        self.measured = spread = _range(values)
+        limit = f"{'at least' if test.compare == '>=' else 'at most'} {test.threshold:g}"
+        self.sentence = f"{test.what}: {good} of {total} {limit} (measured {spread})"
+        beside = f"{near} of {total} within a factor {test.factor:g} of it" if near else ""
+        self.sentence += f", {beside}" if beside else ""
+        if self.verdict in (DEPENDS, MACHINE):
+            self.condition = f"{test.what}, {limit}: {_broken_down(test, rows, self.passed)}"
+        if self.verdict == MACHINE:
+            self.condition += f" (measured {spread}; {beside}, which decides nothing)"
 
 
 def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
@@ -269,7 +259,7 @@ def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
 
 
 def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
-    outcomes = [(test, evaluate(test, tables)) for test in tests]
+    outcomes = [(test, Outcome(test, tables)) for test in tests]
     deciding = [o for test, o in outcomes if test.decides]
     return {
         "measured": "; ".join(o.measured for o in deciding),
@@ -320,11 +310,10 @@ def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFr
 
 def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
     """Cells of table claims_tests with the result of ``test``: margin, counts, range, verdict."""
-    values = values_of(test, tables)[VALUE].to_numpy(float)
-    good, total = int(satisfied(test, values).sum()), len(values)
-    spread = (values.min(), np.median(values), values.max()) if total else (None, None, None)
-    near, answer = int(close(test, values).sum()), answer_of(test, values)
-    found = zip(FOUND, (good, total, near, *spread, answer), strict=True)
+    own = Outcome(test, tables)
+    values, counts = own.values, (int(own.passed.sum()), len(own.values), int(own.near.sum()))
+    spread = (values.min(), np.median(values), values.max()) if len(values) else (None,) * 3
+    found = zip(FOUND, (*counts, *spread, own.verdict), strict=True)
     return {"margin": test.factor if test.timed else None, **dict(found)}
 
 
@@ -343,17 +332,12 @@ def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
     timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),
 )
 def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, kind of verdict (`PARTS`) and variation of the tests that decide it."""
-    return sensitivity_rows(load_claims(rules, added), tables)
-
-
-def sensitivity_rows(rules: Mapping[str, ClaimRule], tables: Tables) -> pd.DataFrame:
     """One row per claim, kind of verdict (`PARTS`) and variation of the tests that decide it.
 
     A variation is omitted if a test has no rows; of sizes, splits, scenes, also if no row changes.
     """
     made = []
-    for claim, rule in rules.items():
+    for claim, rule in load_claims(rules, added).items():
         for part in PARTS:
             tests = [test for test in getattr(rule, part) if test.decides]
             if not tests:

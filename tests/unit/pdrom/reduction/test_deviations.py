@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 
 from builders import make_scene, random_rotation
+from pdrom.model import metrics
 from pdrom.model.metrics import deformation_error
 from pdrom.model.runs import trajectory
-from pdrom.reduction import deviations
-from pdrom.reduction.deviations import (
-    DEVIATIONS,
-    ERRORS,
-    REFERENCE,
-    Yardstick,
-    errors_within,
-)
+from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Yardstick, errors_within
 from pdrom.reduction.rerun import displacement_norms
 
 SPRING = {"effect": "spring", "weight": 1e4}
@@ -96,7 +90,7 @@ def test_blocks_of_frames_do_not_matter(monkeypatch):
     run = SimpleNamespace(positions=positions, difference=displacement_norms(positions))
     found = []
     for block in (1, 7, 1000):
-        monkeypatch.setattr(deviations, "BLOCK", block)
+        monkeypatch.setattr(metrics, "BLOCK", block)
         measure = Yardstick(measure.scene, measure.reference)
         found.append({**measure.series, **measure.deviations(run)})
     assert set(found[0]) == {*REFERENCE, *DEVIATIONS}

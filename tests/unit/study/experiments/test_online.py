@@ -1,14 +1,15 @@
 """Experiment online: the rows of one scene."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from builders import TOP, make_scene
-from pdrom.core.errors import ConfigurationError, PdromError
+from pdrom.core.errors import PdromError
 from pdrom.core.provenance import made_by
 from pdrom.core.store import read_table, write_table
-from pdrom.core.yamlfile import validate
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.types import save_mesh
 from pdrom.model.scene import SceneConfig
@@ -16,9 +17,8 @@ from pdrom.reduction.deviations import ERRORS
 from study.artifact.paths import File
 from study.experiments import frame_times as timing
 from study.experiments import subspaces as experiment
-from study.experiments.frame_times import TimedScene
 from study.experiments.kit.measurement import Processes, in_processes
-from study.experiments.subspaces import COLUMNS, LARGE_COLUMNS, Hrpd, LargeModels, Online
+from study.experiments.subspaces import COLUMNS, LARGE_COLUMNS, Hrpd, LargeModels
 from study.tables.effects_cost import frame_times, online, speedups
 
 JUDGED = ("motion", "horizon_frame", "playback_error", *ERRORS)
@@ -91,9 +91,9 @@ def test_every_model_has_its_errors_and_its_time_in_a_fresh_process(written):
 
 
 def test_a_process_that_fails_is_told(written):
-    missing = TimedScene(written[0], frames=1, models=[({}, None)])
+    missing = partial(timing.variants, written[0], [({}, None)], 1)
     with pytest.raises(PdromError, match="'NoneType' object has no attribute"):
-        in_processes([missing.variants], ONCE)
+        in_processes([missing], ONCE)
 
 
 def test_a_motion_that_blows_up_has_an_infinite_error(written, tmp_path):
@@ -107,8 +107,3 @@ def test_a_motion_that_blows_up_has_an_infinite_error(written, tmp_path):
     (row,) = table.itertuples()
     found = (row.relative_error_heldout, row.relative_error_heldout_high)
     assert (row.relative_error_train, *found) == (0.1, 0.3, np.inf)
-
-
-def test_faulty_settings_are_refused():
-    with pytest.raises(ConfigurationError, match="tolerances"):
-        validate(Online, {"tolerances": [2.0]}, "here")

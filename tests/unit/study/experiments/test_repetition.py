@@ -61,15 +61,6 @@ def test_drawn_frames_are_stored_ones_in_order(sheet):
     assert not np.array_equal(drawn(data, 1), drawn(data, 2))
 
 
-def test_other_training_frames_are_another_basis(short):
-    asked = Repetitions(repetitions=2)
-    one, other = short.repeat(BLOCK, [3, 999], "training", asked)
-    assert one["gain"] != other["gain"]
-    assert abs(one["error"] - other["error"]) > 1e-3 * one["error"]
-    assert short.repeat(BLOCK, [3], "training", asked) == [one, other]
-    assert short.full.scene.config.frames == END
-
-
 def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
     scene, reference, data = sheet
     whole = ReducedRuns("spring", data, Yardstick(scene, reference), END)
@@ -110,22 +101,6 @@ def test_a_run_that_ends_early_is_wrong_without_bound(short, monkeypatch):
 
 
 LADDER = LadderSection(**read_yaml(ROOT / "config" / "default.yaml")["ladder"])
-
-
-@pytest.mark.parametrize("direction", ["up", "down"])
-def test_every_rung_reproduces_what_is_in_its_space(direction, rng):
-    """Each method of the ladder is exact on its affine space, unless it solves with Tikhonov."""
-    snapshots = rng.standard_normal((12, 40, 3))
-    for method in getattr(LADDER, direction):
-        basis = compute_basis(snapshots, np.ones(40), 0.0, 2, method)
-        reduction = Reduction(basis, select(basis, method, 5), method, 5)
-        assert np.isfinite(reduction.gain)
-        if method.solve == "tikhonov":
-            continue
-        axes = 3 if method.per_axis else 1
-        space = reduction.v.reshape(40, 3, 5) * rng.standard_normal((axes, 5))
-        p = basis.mean.reshape(40, 3) + space.sum(axis=2)
-        assert reduction.reconstruct(p[None])[0] == pytest.approx(p, abs=1e-8 * reduction.gain)
 
 
 def test_rungs_change_one_ingredient_at_a_time():

@@ -4,11 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from builders import GRAVITY, frame, make_scene
+from builders import GRAVITY, make_scene, perturbed_runs
 from builders import TOP as PINS
 from pdrom.core.store import read_table, write_table
 from pdrom.model.runs import trajectory
-from pdrom.reduction.deviations import error_within
 from study.experiments import sensitivity as module
 from study.experiments.kit.base import floor_of, horizon, horizons, perturbation_field
 
@@ -65,20 +64,9 @@ def test_table_has_every_perturbation_seed_variant_and_frame():
     assert labelled.relative_difference[labelled.seed == 2].tolist() == own.tolist()
 
 
-PERTURBED = {
-    ("a", "1e-10", 1): [0.0, 1e-9, 5e-3, 1e-9],
-    ("a", "1e-10", 2): [0.0, 2e-9, 1e-9, 1.0],
-    ("a", "1e-06", 1): [1.0] * 4,
-    ("a", "heldout", 1): [1e-12, 1.0, 1.0, 1.0],
-    ("b", "1e-10", 1): [1e-12, 3e-12, 2e-12, 1e-12],
-    ("b", "heldout", 1): [1e-12] * 4,
-}
-
-
 def test_floors_are_the_largest_over_the_seeds_and_horizons_survive_a_file(tmp_path):
     """Labels are found as text and, where all labels in the file are numbers, as numbers."""
-    rows = [(*key, number, v) for key, own in PERTURBED.items() for number, v in enumerate(own)]
-    floors = frame("scene perturbation seed frame relative_difference", *rows)
+    floors = perturbed_runs()
     write_table(floors[floors.perturbation == "1e-10"], tmp_path / "sensitivity.csv")
     read = read_table(tmp_path / "sensitivity.csv")
     for table in (floors, read, floors.sample(frac=1.0, random_state=3)):
@@ -99,12 +87,6 @@ def test_floors_are_the_largest_over_the_seeds_and_horizons_survive_a_file(tmp_p
 )  # fmt: skip
 def test_horizon_is_the_first_frame_above(floor, expected):
     assert horizon(np.array(floor), 1e-3) == expected
-
-
-def test_the_error_counts_frames_before_the_end_only():
-    difference, displacement = np.array([3.0, 4.0, np.inf]), np.array([6.0, 8.0, 1.0])
-    found = [error_within(difference, displacement, end) for end in range(5)]
-    assert found == [None, pytest.approx(0.5), pytest.approx(0.5), np.inf, None]
 
 
 SOFT = {"effect": "spring", "weight": 1e3}

@@ -5,14 +5,11 @@ from itertools import product
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from builders import frame
+from builders import perturbed_runs
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.reduction.basis import Basis, save_basis
-from pdrom.reduction.settings import pareto
 from study.artifact import paths
 from study.artifact.paths import File
 from study.experiments.kit.base import Horizon
@@ -163,15 +160,6 @@ def files(tmp_path) -> dict[str, object]:
             time("b", ms=0.5, group="all", method="ecsw-1e-02", position_basis="pod", k=8),
         ),
     ]  # fmt: skip
-    values = {
-        ("a", "1e-10", 1): [0.0, 1e-9, 5e-3, 1e-9],
-        ("a", "1e-10", 2): [0.0, 2e-9, 1e-9, 1.0],
-        ("a", "1e-06", 1): [1.0] * 4,
-        ("a", "heldout", 1): [1e-12, 1.0, 1.0, 1.0],
-        ("b", "1e-10", 1): [1e-12, 3e-12, 2e-12, 1e-12],
-        ("b", "heldout", 1): [1e-12] * 4,
-    }
-    rows = [(*key, number, v) for key, own in values.items() for number, v in enumerate(own)]
     references = [
         {"scene": scene, "motion": motion, "frames": 4, "horizon_frame": 4, "playback_all": 0.5,
          "playback_error": 0.5 if motion == "heldout" else None, "playback_deformation_error": 0.4,
@@ -180,7 +168,7 @@ def files(tmp_path) -> dict[str, object]:
         for scene, motion in product("ab", (TRAIN, *MOTIONS))
     ]  # fmt: skip
     path = tmp_path / "sensitivity.csv"
-    write_table(frame("scene perturbation seed frame relative_difference", *rows), path)
+    write_table(perturbed_runs(), path)
     return {
         "references": [written(tmp_path / "references.csv", *references)],
         "runs": each(paths.RERUNS, reruns),
@@ -265,20 +253,6 @@ def test_held_out_runs_are_judged_by_their_own_horizon(files):
     assert table[["ms_per_frame", "speedup"]].isna().all(axis=None)
     # it blew up in frame 1, which is behind the horizon
     assert table.relative_error_within_horizon[1] == pytest.approx(0.5)
-
-
-POINTS = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12)
-
-
-@given(POINTS)
-def test_pareto_keeps_what_nothing_beats(points):
-    error, cost = zip(*points, strict=True)
-    kept = pareto(np.array(error, float), np.array(cost, float))
-    front = [p for p, keep in zip(points, kept, strict=True) if keep]
-    assert front
-    for point, keep in zip(points, kept, strict=True):
-        beaten = any(q != point and q[0] <= point[0] and q[1] <= point[1] for q in front)
-        assert keep != beaten
 
 
 def sweep(folder, **changes) -> File:

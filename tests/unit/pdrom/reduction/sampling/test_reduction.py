@@ -28,6 +28,7 @@ INGREDIENTS = {
     "rows": ("all", "scalar", "joint", "element"),
     "selection": ("greedy", "pivoted-qr", "s-opt"),
     "solve": ("square", "qr", "tikhonov"),
+    "coefficients": (None, "shared", "per-axis"),
 }
 
 
@@ -39,7 +40,7 @@ def combinations() -> dict[str, MethodSpec]:
             spec = MethodSpec(title="t", **dict(zip(INGREDIENTS, values, strict=True)))
         except ValidationError:
             continue
-        specs["/".join(values)] = spec
+        specs["/".join(map(str, values))] = spec
     return specs
 
 
