@@ -22,7 +22,6 @@ from pdrom.reduction.method import MethodSpec
 from study.artifact import paths
 from study.artifact.markup import filled, to_tex
 from study.artifact.reads import Labels
-from study.experiments.alternatives.experiment import CONTINUOUS_TOLERANCE
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from study.experiments.kit.base import Horizon, OfScene
 from study.experiments.repetitions import Cell, Repeated
@@ -199,7 +198,6 @@ def _numbers(study: Study) -> dict[str, Any]:
         "wrong": settings.stability.wrong,
         "left": settings.stability.left,
         "tolerance": settings.reference.tolerance,
-        "continuous_tolerance": CONTINUOUS_TOLERANCE,
         "opponent_frames": settings.alternatives.frames,
         "opponent_processes": settings.alternatives.processes,
         "far": FAR,

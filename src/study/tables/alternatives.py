@@ -67,8 +67,6 @@ estimated = partial(replace, *shared("reference_error"))  # column of errors of 
             "deformation error against the converged step",
             tolerance=ERROR_TOLERANCE,
         ),
-        number("error_continuous", "against continuous time: the total", tolerance=ERROR_TOLERANCE),
-        estimated(meaning="estimated error of that motion"),
         estimated(name="implicit_error", meaning="of the converged step, by a much finer solve"),
         estimated(name="implicit_deformation_error", meaning="of its shapes"),
         *shared("mesh_error"),

@@ -1,8 +1,7 @@
 """Error and time of every setting that simulates a scene, on its own mesh and on coarser ones.
 
-The first reference is the scene's implicit time step, solved to convergence, which methods approach
-with more iterations. The second is the motion in continuous time: a user wants this motion, and the
-implicit step deviates from it. All settings run the held-out motions; only subspaces are trained.
+The reference is the scene's implicit time step, solved to convergence, which methods approach with
+more iterations. All settings run the held-out motions; only subspaces are trained.
 Where reduced models are chosen, they and all others run validation motions, too.
 """
 
@@ -21,7 +20,6 @@ from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.coarser import Coarser, error_of_mesh, grids
 from pdrom.model.constraints.base import GroupConfig
-from pdrom.model.dynamics.system import GlobalSystem
 from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.model.runs import converged_run, trajectory
 from pdrom.model.scene import Scene, SceneConfig
@@ -44,13 +42,10 @@ from study.artifact.reads import SourcesOf
 from study.experiments.alternatives.solvers.methods import (
     WINDOW,
     Chebyshev,
-    Explicit,
     TwoLevel,
-    continuous,
     measured_rate,
 )
 from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import Processes, in_processes
 
@@ -73,25 +68,16 @@ Steps = Annotated[
     tuple[kit.Count, kit.Count], Field(description="substeps of a frame, iterations of each")
 ]
 Method = Literal[
-    "projective", "anderson", "chebyshev", "chebyshev-power", "explicit", "two-level",
+    "projective", "anderson", "chebyshev", "chebyshev-power", "two-level",
     "coarser-mesh", "coarser-mesh-anderson",
 ]  # fmt: skip
 
 
-# The motion in continuous time is computed by explicit steps, `EXPLICIT_STEPS` per frame in the
-# first run, and halved until the estimated error is below `CONTINUOUS_TOLERANCE`.
-EXPLICIT_STEPS, CONTINUOUS_TOLERANCE = 40, 1e-4
 # Frames of training runs converge to this part of the mesh; projections are evaluated up to `MOST`
 # times in a frame, also of the implicit reference.
 TRAINING_TOLERANCE, MOST = 1e-5, 4000
 COARSE_TAU = 5e-3  # sampling tolerance of the coarse level of the two-level method
 VALIDATION = 1_000_000  # first seed of validation motions, far from those of training motions
-
-
-class ContinuousReference(ConfigModel):
-    """Largest product (``limit``) of vertices and explicit steps of a frame; none is run beyond."""
-
-    limit: Work = 2_400_000
 
 
 class ImplicitReference(ConfigModel):
@@ -135,7 +121,8 @@ class Comparison(Processes):
     Each of ``processes`` new processes times ``frames`` frames spread over each held-out motion.
 
     stiffness : scene -> factors by which its groups' weights are multiplied; 1 without an entry
-    steps : method -> pairs (substeps of a frame, iterations of each substep)
+    steps : method -> pairs (substeps of a frame, iterations of each substep); only those of plain
+        and accelerated iterations on the own mesh may have several substeps
     coarser : parts of the cells along a side that coarser meshes have
     work : method -> largest product vertices x substeps x iterations (for ``training``: vertices x
         motions); runs with more work are left out
@@ -152,7 +139,6 @@ class Comparison(Processes):
     seconds: Annotated[float, Field(gt=0.0, le=1e4)] = 2.0
     validation: Annotated[int, Field(ge=0, le=64)] = 0
     implicit: ImplicitReference = ImplicitReference()
-    continuous: ContinuousReference = ContinuousReference()
     frames: kit.Count = 20
     repeats: kit.Repeats = 1
 
@@ -186,7 +172,7 @@ LABELS = ["scene", "factor", "stiffness", "motion"]
 TIME_COLUMNS = [*LABELS, *SETTING, "process", "ms_per_frame", "vertices_ms"]
 COLUMNS = [
     *LABELS, *SETTING, "offline_s", "elements_sampled", "training_residual", "frames", "finite",
-    "error_implicit", "deformation_error", "error_continuous", "reference_error", "implicit_error",
+    "error_implicit", "deformation_error", "implicit_error",
     "implicit_deformation_error", "mesh_error",
 ]  # fmt: skip
 
@@ -222,9 +208,9 @@ class Case:
         for own in self.models:
             common = {**own.labels, "substeps": 1}
             if own.coarse:
-                for substeps, count in self._pairs(TWO_LEVEL):
+                for _, count in self._pairs(TWO_LEVEL):
                     labels = {**common, "method": TWO_LEVEL, "iterations": count}
-                    loop = TwoLevel(self.scene, substeps, count, own.model)
+                    loop = TwoLevel(self.scene, count, own.model)
                     yield Setting(labels, loop, self.scene.initial_state())
             for method, counts in own.iterations.items():
                 for asked in counts:
@@ -245,15 +231,10 @@ class Case:
         scene, start = self.scene, self.scene.initial_state()
         rates = {"chebyshev": None, "chebyshev-power": measured_rate}
         for method, rate in rates.items():
-            for substeps, count in self._pairs(method):
-                step = scene.config.time_step / substeps
-                system = GlobalSystem(scene.masses, step, scene.groups)
-                loop = Chebyshev(scene, substeps, count, system)
+            for _, count in self._pairs(method):
+                loop = Chebyshev(scene, count)
                 loop.rate = loop.rate if rate is None else rate(scene)
-                yield Setting(self._labels(method, substeps, count), loop, start)
-        for substeps, count in self._pairs("explicit"):
-            labels = self._labels("explicit", substeps, count)
-            yield Setting(labels, Explicit(scene, substeps, count), start)
+                yield Setting(self._labels(method, 1, count), loop, start)
 
     def _pairs(self, method: str) -> list[tuple[int, int]]:
         return self.section.pairs(method, self.scene.mesh.vertices)
@@ -396,19 +377,13 @@ def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[dict[str, An
     """Yield rows with errors of runs in the motion of ``case``, one row for each run.
 
     The first are the converged implicit step on all meshes and the ``recorded`` training motion,
-    shown instead. Errors against the implicit step are None if a frame of it did not converge or
-    its work exceeds the limit in the section. Runs that blew up have no errors (None) at all. Only
-    a ``test`` motion is compared with the motion in continuous time and with a finer solve.
+    shown instead. Errors are None if a frame of the converged step did not converge or its work
+    exceeds the limit in the section, and of runs that blew up. Only a ``test`` motion is compared
+    with a finer solve.
     """
     scene, section = case.scene, case.section
-    frames, implicit, exact = scene.config.frames, None, None
+    frames, implicit = scene.config.frames, None
     common: dict[str, Any] = {"frames": frames}
-    if test and EXPLICIT_STEPS * scene.mesh.vertices <= section.continuous.limit:
-        limit = section.continuous.limit // scene.mesh.vertices
-        exact = continuous(scene, frames, CONTINUOUS_TOLERANCE, EXPLICIT_STEPS, limit)
-        common["reference_error"] = exact.error
-        if not exact.error <= CONTINUOUS_TOLERANCE:
-            log.warning("%s: continuous time is known to %.1e only", scene.config.name, exact.error)
     tolerance = section.implicit.tolerance
     if section.affords(CONVERGED, scene.mesh.vertices):
         implicit = converged_run(scene, tolerance, MOST)
@@ -419,11 +394,8 @@ def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[dict[str, An
         common |= _own_errors(truth, tolerance / section.implicit.finer)
 
     def errors(run: np.ndarray | None) -> dict[str, float | None]:
-        if run is None:
-            return {}
-        position, shape = (None, None) if truth is None else truth.errors(run, frames)
-        total = None if exact is None else runfiles.run_error(run, exact.positions)
-        return {"error_implicit": position, "deformation_error": shape, "error_continuous": total}
+        found = (None, None) if run is None or truth is None else truth.errors(run, frames)
+        return dict(zip(("error_implicit", "deformation_error"), found, strict=True))
 
     own = {"substeps": 1, "finite": True, "vertices": scene.mesh.vertices, **common}
     coarse = [mesh.converged(tolerance, MOST) for mesh in case.coarser]

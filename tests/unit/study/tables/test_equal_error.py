@@ -45,7 +45,7 @@ def made(folder, *recorded, runs=RUNS, cases=CASES, **changes) -> tuple[pd.DataF
     """
     common = {"scene": "s", "factor": 1.0, "stiffness": 1.0, "substeps": 1, "finite": True}
     common |= {"frames": 5, "elements_sampled": 3, "training_residual": 0.0}
-    common |= {"reference_error": 0.0, "error_continuous": 0.0, "implicit_error": 0.01}
+    common |= {"implicit_error": 0.01}
     common |= {"implicit_deformation_error": 0.01, "offline_s": 3.0, "vertices_ms": 0.1}
     rows = pd.concat([
         runs.assign(motion=motion, error_implicit=runs.error_implicit * factor,

@@ -1,14 +1,13 @@
-"""Methods beside the plain and the accelerated local/global iteration, with substeps of a frame.
+"""Methods with K local/global iterations of a frame, beside the plain and the accelerated one.
 
-They are explicit integration, and K local/global iterations of each substep: by Chebyshev's
-semi-iteration (Wang 2015, alg. 1), or with Anderson acceleration and a coarse level.
+They are Chebyshev's semi-iteration (Wang 2015, alg. 1), and Anderson acceleration with a coarse
+level.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import linalg, sparse
+from scipy import linalg
 
 from pdrom.core.errors import SceneError
 from pdrom.model.compiled.arithmetic import add, add_scaled, constant
@@ -18,16 +17,10 @@ from pdrom.model.constraints.local_kernel import add_all, table_of
 from pdrom.model.dynamics.acceleration import Anderson, combine, forget, refuse
 from pdrom.model.dynamics.frames import inertia_energy, weighted
 from pdrom.model.dynamics.sweeps import sweep
-from pdrom.model.runs import followed
 from pdrom.model.scene import Scene
 from pdrom.reduction.subspace.ecsw import Samples
 from pdrom.reduction.subspace.model import SubspaceModel
-from study.experiments.alternatives.solvers.substeps import (
-    Alternative,
-    Substeps,
-    begin,
-    end,
-)
+from study.experiments.alternatives.solvers.frame import Alternative, Frame, begin, end
 
 WINDOW = 5  # number of earlier iterates in Anderson acceleration, as in Peng et al. 2018
 # Parameters of Chebyshev's semi-iteration: convergence rate of the plain iteration, and largest
@@ -59,38 +52,36 @@ class Chebyshev(Alternative):
     name = "chebyshev"
     rate = RATE
 
-    def _advance(self, part: Substeps) -> None:
+    def _advance(self, part: Frame) -> None:
         plain, inertia = min(PLAIN, self.iterations // 3), self.space.system.inertia
         _chebyshev(*part, inertia, self.table, self._factor(part), self.rate, plain)
 
 
 @compiled(nogil=True)
 def _chebyshev(
-    y, v, acceleration, step, substeps, iterations, fixed, targets, inertia, table, factor, rate,
-    plain,
-):  # fmt: skip
+    y, v, acceleration, step, iterations, fixed, targets, inertia, table, factor, rate, plain
+):
     panels, vertices, loads, work = factor
     before, s, rhs = np.empty(len(y)), np.empty(len(y)), np.empty(len(y))
     last, image = np.empty(len(y)), np.empty(len(y))
-    for _ in range(substeps):
-        begin(y, v, acceleration, step, fixed, targets, before, s)
-        base = weighted(inertia, s)
-        weight = 1.0
-        write(y, last)
-        for k in range(iterations):
-            write(base, rhs)
-            add_all(table, y, rhs)
-            write(y, image)
-            sweep(panels, vertices, loads, work, rhs, image)
-            if k == plain:
-                weight = 2.0 / (2.0 - rate * rate)
-            elif k > plain:
-                weight = 4.0 / (4.0 - rate * rate * weight)
-            for j in range(len(y)):
-                held = y[j]
-                y[j] = weight * (image[j] - last[j]) + last[j]
-                last[j] = held
-        end(y, before, step, v)
+    begin(y, v, acceleration, step, fixed, targets, before, s)
+    base = weighted(inertia, s)
+    weight = 1.0
+    write(y, last)
+    for k in range(iterations):
+        write(base, rhs)
+        add_all(table, y, rhs)
+        write(y, image)
+        sweep(panels, vertices, loads, work, rhs, image)
+        if k == plain:
+            weight = 2.0 / (2.0 - rate * rate)
+        elif k > plain:
+            weight = 4.0 / (4.0 - rate * rate * weight)
+        for j in range(len(y)):
+            held = y[j]
+            y[j] = weight * (image[j] - last[j]) + last[j]
+            last[j] = held
+    end(y, before, step, v)
 
 
 INNER = 10  # number of coarse-level iterations (Anderson acceleration) in each iteration
@@ -113,9 +104,9 @@ class TwoLevel(Alternative):
 
     name = "two-level"
 
-    def __init__(self, scene: Scene, substeps: int, iterations: int, model: SubspaceModel) -> None:
+    def __init__(self, scene: Scene, iterations: int, model: SubspaceModel) -> None:
         self._model = model
-        super().__init__(scene, substeps, iterations)
+        super().__init__(scene, iterations)
 
     def _prepare(self, scene: Scene) -> None:
         if len(scene.groups) != 1:
@@ -141,7 +132,7 @@ class TwoLevel(Alternative):
         self._history, self._inner = Anderson(WINDOW), Anderson(WINDOW)
         self._inner.begin_frame(np.zeros((len(span), WIDTH)))
 
-    def _advance(self, part: Substeps) -> None:
+    def _advance(self, part: Frame) -> None:
         y = unflat(part.y)
         self._history.begin_frame(part.y.reshape(-1, WIDTH))
         self._group.begin_frame(y[self._vertices])
@@ -152,29 +143,27 @@ class TwoLevel(Alternative):
 
 @compiled(nogil=True)
 def _two_level(
-    y, v, acceleration, step, substeps, iterations, fixed, targets, inertia, table, factor,
-    history, coarse,
-):  # fmt: skip
+    y, v, acceleration, step, iterations, fixed, targets, inertia, table, factor, history, coarse
+):
     panels, vertices, loads, work = factor
     before, s, rhs = np.empty(len(y)), np.empty(len(y)), np.empty(len(y))
     plain = np.empty(len(y))
-    for _ in range(substeps):
-        begin(y, v, acceleration, step, fixed, targets, before, s)
-        base = weighted(inertia, s)
-        forget(history)
-        for k in range(iterations):
-            write(base, rhs)
-            objective = add_all(table, y, rhs) + inertia_energy(y, s, inertia)
-            # 0: test also the iterate after the first correction, which may raise the objective
-            if refuse(history, y, objective, 0):
-                write(plain, y)
-                continue
-            sweep(panels, vertices, loads, work, rhs, y)
-            if k < iterations - 1:
-                write(y, plain)
-                _correct(coarse, history[0], y)
-                combine(history, y)
-        end(y, before, step, v)
+    begin(y, v, acceleration, step, fixed, targets, before, s)
+    base = weighted(inertia, s)
+    forget(history)
+    for k in range(iterations):
+        write(base, rhs)
+        objective = add_all(table, y, rhs) + inertia_energy(y, s, inertia)
+        # 0: test also the iterate after the first correction, which may raise the objective
+        if refuse(history, y, objective, 0):
+            write(plain, y)
+            continue
+        sweep(panels, vertices, loads, work, rhs, y)
+        if k < iterations - 1:
+            write(y, plain)
+            _correct(coarse, history[0], y)
+            combine(history, y)
+    end(y, before, step, v)
 
 
 @inner
@@ -220,113 +209,3 @@ def _add_product(matrix, x, out):
         if n % 2:
             even = add_scaled(even, at(numbers, n * i + n - 1), load(x, WIDTH * (n - 1)))
         store(out, WIDTH * i, add(even, odd))
-
-
-UNSTABLE = 1e100  # a run with larger coordinates (m), or with values not finite, was unstable
-
-
-class Explicit(Alternative):
-    """Explicit integration by position Verlet; ``iterations`` are ignored.
-
-    A substep advances positions over half its time, then velocities over its whole time, and then
-    positions over the other half. The method is symplectic and of second order (Tuckerman et al.
-    1992), with one evaluation of forces per substep. It is stable if the substep is shorter than
-    2 / omega, where omega is the angular frequency of the stiffest mode.
-    """
-
-    name = "explicit"
-
-    def _prepare(self, scene: Scene) -> None:
-        total = sparse.csr_array((len(self.masses), len(self.masses)))
-        for group in scene.groups:
-            total = total + group.system_matrix()
-        total.sort_indices()
-        # stiffness matrix, the sum of S^T W S over all groups, as CSR arrays for `_multiply`
-        self._stiffness = *(i.astype(np.int32) for i in (total.indptr, total.indices)), total.data
-
-    def _advance(self, part: Substeps) -> None:
-        rows, fixed = part.y.reshape(-1, WIDTH), part.fixed
-        speed = (part.targets - rows[fixed, :3]) / (part.substeps * part.time_step)
-        part.v.reshape(-1, WIDTH)[fixed, :3] = speed
-        inverse = 1.0 / self.masses
-        inverse[fixed] = 0.0  # fixed vertices are not accelerated
-        _explicit(*part[:5], inverse, self.table, self._stiffness)
-        rows[fixed, :3] = part.targets
-
-
-@compiled(nogil=True)
-def _explicit(y, v, acceleration, step, substeps, inverse, table, stiffness):
-    pull, elastic = np.empty(len(y)), np.empty(len(y))
-    for _ in range(substeps):
-        for k in range(len(y)):
-            y[k] += 0.5 * step * v[k]
-            pull[k] = 0.0
-        add_all(table, y, pull)
-        _multiply(stiffness, y, elastic)
-        for i in range(len(inverse)):
-            if inverse[i] > 0.0:
-                for axis in range(3):
-                    k = WIDTH * i + axis
-                    force = pull[k] - elastic[k]
-                    v[k] += step * (acceleration[axis] + inverse[i] * force)
-        for k in range(len(y)):
-            y[k] += 0.5 * step * v[k]
-
-
-@inner
-def _multiply(matrix, y, out):
-    """Write ``matrix`` (N, N; CSR) times ``y`` (N, 4) to ``out`` (N, 4); both are flat arrays."""
-    indptr, indices, data = matrix
-    for i in range(len(indptr) - 1):
-        total = constant(0.0)
-        for k in range(at(indptr, i), at(indptr, i + 1)):
-            total = add_scaled(total, at(data, k), load(y, WIDTH * at(indices, k)))
-        store(out, WIDTH * i, total)
-
-
-@dataclass(frozen=True)
-class Continuous:
-    """Motion in continuous time, as computed by `continuous`.
-
-    positions : (F + 1, N, 3) m, initial positions Q_0, then positions at the ends of frames
-    error : estimate of || Q - Q_exact || / || Q - Q_0 ||, from the last halving of the step
-    substeps : number of explicit steps of a frame
-    """
-
-    positions: np.ndarray
-    error: float
-    substeps: int
-
-
-def continuous(
-    scene: Scene, frames: int, tolerance: float, substeps: int, limit: int
-) -> Continuous:
-    """Run ``frames`` of ``scene`` by explicit steps, halving the step until the error is small.
-
-    tolerance : estimated relative error that ends the halving
-    substeps : number of substeps of a frame in the first run
-    limit : largest number of substeps of a frame; the last run is returned, whatever its error
-    """
-    start, before, last = scene.initial_state(), None, np.inf
-    while True:
-        after = followed(Explicit(scene, substeps), start, frames)
-        if before is not None:
-            change = _change(before, after)
-            # Richardson's estimate of the remaining error. With each halving of the step, changes
-            # of a method of second order fall to a quarter; a third of the last change then
-            # remains. If changes do not even fall to a half, the motion is not smooth or not yet
-            # resolved, and the estimate is the whole change.
-            ratio = last / change if change > 0.0 and np.isfinite(last) else 1.0
-            error = change / min(max(ratio - 1.0, 1.0), 3.0)
-            if error <= tolerance or 2 * substeps > limit:
-                return Continuous(after, error, substeps)
-            last = change
-        before, substeps = after, 2 * substeps
-
-
-def _change(before: np.ndarray, after: np.ndarray) -> float:
-    """Norm of the difference of two runs / norm of the motion in ``after``; inf if unstable."""
-    if not max(np.abs(before).max(), np.abs(after).max()) < UNSTABLE:
-        return float("inf")
-    difference, moved = np.linalg.norm(after - before), np.linalg.norm(after - after[0])
-    return float(difference / moved) if moved > 0.0 else 0.0

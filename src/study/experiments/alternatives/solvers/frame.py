@@ -1,9 +1,6 @@
-"""Base class of methods that divide a frame into equal substeps.
+"""Base class of methods that solve a frame in a compiled loop of their own.
 
-Vertices are held, and contacts act at the end of a frame, as in the ordinary step loop. The
-potential energy of all groups j with elements e, W(y) = sum_j 1/2 sum_e w_e |S_e y - p_e(y)|^2, has
-the gradient S^T W S y - S^T W p(y): the projection p is the nearest point of a manifold, so that
-the derivative of p is tangential and drops out (Bouaziz et al. 2014, sect. 3).
+Vertices are held, and contacts act at the end of a frame, as in the ordinary step loop.
 """
 
 from abc import abstractmethod
@@ -20,55 +17,47 @@ from pdrom.model.constraints.local_kernel import table_of
 from pdrom.model.dynamics.solvers import Factor
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
-from pdrom.model.dynamics.system import Elimination, GlobalSystem
+from pdrom.model.dynamics.system import Elimination
 from pdrom.model.effects.forces import Gravity
 from pdrom.model.scene import Scene
 
 
-class Substeps(NamedTuple):
-    """Arguments of compiled loops over substeps of a frame, in the order of the parameters.
+class Frame(NamedTuple):
+    """First arguments of a compiled loop over the iterations of a frame, in their order.
 
     y, v : (4 N,) positions m and velocities m/s, changed in place: x, y, z and 0 of each vertex
     acceleration : (3,) m/s^2
-    time_step : length of a substep, s
-    substeps, iterations : number of substeps, and number of iterations in each of them
-    fixed, targets : fixed vertices (n,) and their positions (n, 3) at the end of the substeps, m
+    time_step : s
+    iterations : number of iterations
+    fixed, targets : fixed vertices (n,) and their positions (n, 3) m at the end
     """
 
     y: np.ndarray
     v: np.ndarray
     acceleration: np.ndarray
     time_step: float
-    substeps: int
     iterations: int
     fixed: np.ndarray
     targets: np.ndarray
 
 
 class Alternative(Stepper):
-    """Base class of methods that divide a frame into ``substeps`` steps of ``iterations`` each.
+    """Base class of methods with ``iterations`` local/global iterations of a frame.
 
-    A handle moves at constant speed during a frame, whatever the number of substeps. As in the
-    ordinary step loop, contacts act at the end of a frame, and groups compute data for a frame at
-    its beginning. Loops with equal substeps may share a factorised ``system``. Raises SceneError if
-    the scene has a force other than gravity (which every substep would have to evaluate if it
-    depends on the motion), or a group without a compiled local step.
+    Raises SceneError if the scene has a force other than gravity, or a group without a compiled
+    local step.
     """
 
     name: ClassVar[str]
     space: VertexSpace
 
-    def __init__(
-        self, scene: Scene, substeps: int, iterations: int = 1, system: GlobalSystem | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, iterations: int) -> None:
         named = f"scene '{scene.config.name}', effect '%s': method '{self.name}' "
         for force in scene.forces:
             if not isinstance(force, Gravity):
                 raise SceneError(named % force.name + "takes no force but gravity")
-        step = scene.config.time_step / substeps
-        system = system or GlobalSystem(scene.masses, step, scene.groups)
-        super().__init__(scene.space(system), step, iterations, scene.groups, False)
-        self.substeps = substeps
+        step = scene.config.time_step
+        super().__init__(scene.space(scene.system), step, iterations, scene.groups, False)
         self.masses = scene.masses
         kernels: list[Any] = [getattr(step, "local_kernel", None) for step in self.local_steps]
         for group, kernel in zip(scene.groups, kernels, strict=True):
@@ -94,30 +83,24 @@ class Alternative(Stepper):
         for local in self.local_steps:
             local.begin_frame(q)
         positions, velocities = as_vertices(q), as_vertices(state.velocities)
-        y, v = flat(positions), flat(velocities)
-        # if fixed vertices do not move, all substeps have the same targets: advance them together
-        parts = 1 if np.array_equal(q[fixed], targets) else self.substeps
-        for part in range(1, parts + 1):
-            now = targets + (1.0 - part / parts) * (q[fixed] - targets)
-            steps = (self.time_step, self.substeps // parts, self.iterations)
-            self._advance(Substeps(y, v, acceleration, *steps, fixed, now))
+        numbers = self.time_step, self.iterations, fixed, targets
+        self._advance(Frame(flat(positions), flat(velocities), acceleration, *numbers))
         # a vertex that a contact moves gets its mean velocity over the frame
         free = positions.copy()
         self.space.correct(positions, q, frame)
         moved = (positions != free).any(axis=1)
         if moved.any():
-            whole = self.time_step * self.substeps
-            velocities[moved] = (positions[moved] - q[moved]) / whole
+            velocities[moved] = (positions[moved] - q[moved]) / self.time_step
         after = State(np.ascontiguousarray(positions), np.ascontiguousarray(velocities), anchors)
         seconds = np.zeros(len(PHASES))
         seconds[1] = perf_counter() - started
         return after, FrameReport(np.empty(0), seconds)
 
     @abstractmethod
-    def _advance(self, part: Substeps) -> None:
-        """Advance positions and velocities in place by all substeps of ``part`` (of a frame)."""
+    def _advance(self, part: Frame) -> None:
+        """Advance positions and velocities in place."""
 
-    def _factor(self, part: Substeps) -> Factor:
+    def _factor(self, part: Frame) -> Factor:
         """Cholesky factor of the system matrix without the rows and columns of fixed vertices."""
         elimination = self.space.eliminate(part.fixed, part.targets)
         assert isinstance(elimination, Elimination)
@@ -127,14 +110,14 @@ class Alternative(Stepper):
 
 @inner
 def begin(y, v, acceleration, step, fixed, targets, before, s):
-    """Begin a substep of an implicit method at the prediction s = y + step v + step^2 a.
+    """Begin a frame at the prediction s = y + step v + step^2 a.
 
     ``before`` receives the old positions. In ``s`` and ``y``, fixed vertices are at their targets.
 
     y, v : (4 N,) positions m and velocities m/s: x, y, z and 0 of each vertex
     acceleration : (3,) m/s^2
-    step : length of the substep, s
-    fixed, targets : fixed vertices (n,) and their positions (n, 3) m at the end of the substep
+    step : time step, s
+    fixed, targets : fixed vertices (n,) and their positions (n, 3) m at the end of the frame
     """
     for i in range(len(y) // WIDTH):
         for axis in range(3):
