@@ -127,6 +127,7 @@ class Comparison(Processes):
     work : method -> largest product vertices x substeps x iterations (for ``training``: vertices x
         motions); runs with more work are left out
     models : reduced models, whose training motions begin with the scene's motion
+    choice : "scene/factor" -> models from which one is chosen, in place of ``models``
     seconds : length of all runs, s
     validation : number of motions on which models are chosen
     """
@@ -136,6 +137,7 @@ class Comparison(Processes):
     coarser: kit.Parts = (2 / 3, *kit.PARTS)
     work: dict[Method | Literal["converged", "training"], Work] = Field(default_factory=dict)
     models: tuple[ReducedModel, ...] = (ReducedModel(training_motions=(1, 2)),)
+    choice: dict[str, tuple[ReducedModel, ...]] = Field(default_factory=dict)
     seconds: Annotated[float, Field(gt=0.0, le=1e4)] = 2.0
     validation: Annotated[int, Field(ge=0, le=64)] = 0
     implicit: ImplicitReference = ImplicitReference()
@@ -157,14 +159,12 @@ class Comparison(Processes):
 
 
 class Alternatives(Comparison):
-    """Section ``alternatives``: in addition, ``scenes`` and what differs in single ones.
+    """Section ``alternatives``.
 
     scenes : scene -> factors by which its mesh gets more vertices along a side, with equal mass
-    choice : "scene/factor" -> models from which one is chosen, in place of ``models``
     """
 
     scenes: kit.Sizes = Field(default_factory=dict)
-    choice: dict[str, tuple[ReducedModel, ...]] = Field(default_factory=dict)
 
 
 log = logging.getLogger(__name__)
@@ -289,7 +289,7 @@ def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
             started = process_time()
             columns = make_columns([training], frames, modes, skinning)
             own = [model for model in asked if model.columns == (modes, skinning)]
-            level = count == 1 and model_of(section, TWO_LEVEL) and own[0] is section.models[0]
+            level = count == 1 and section.steps.get(TWO_LEVEL) and own[0] is section.models[0]
             tolerances = [m.tolerance for m in own] + [COARSE_TAU] * bool(level)
             made = sampled_models(scenes, columns, np.arange(len(runs[0])), tolerances)
             seconds = spent + process_time() - started
@@ -302,11 +302,6 @@ def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
                     "training_residual": model.residual,
                 }  # fmt: skip
                 yield Trained(labels, model, spec.runs if spec else {}, coarse=spec is None)
-
-
-def model_of(section: Comparison, method: Method) -> bool:
-    """Whether ``section`` asks for ``method``."""
-    return bool(section.steps.get(method))
 
 
 def substepped(scene: Scene, substeps: int) -> Scene:
@@ -330,7 +325,7 @@ def substepped(scene: Scene, substeps: int) -> Scene:
     alone=True,
 )
 def alternatives(
-    sources: list[Path], config: SceneConfig, section: Alternatives, out: File, times: File
+    sources: list[Path], config: SceneConfig, section: Comparison, out: File, times: File
 ) -> None:
     """Compare all settings on the mesh with ``out["factor"]`` times the vertices along a side."""
     factor = float(out["factor"])
