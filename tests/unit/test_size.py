@@ -11,9 +11,9 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 35_400,
-    "lines of tests": 22_800,
-    "words of documentation": 25_200,
+    "lines of src": 35_750,
+    "lines of tests": 22_900,
+    "words of documentation": 25_400,
     "tables": 27,
     "figures": 24,
     "experiments": 20,
