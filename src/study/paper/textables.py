@@ -11,6 +11,7 @@ import pandas as pd
 
 from pdrom.model.held_out import MOTIONS
 from study.artifact.text import escape
+from study.experiments.alternatives.experiment import NEWTON
 from study.experiments.error_budget import PARTS
 from study.figures.kit.declaration import declarations
 from study.paper.macros import HIDDEN, format_number
@@ -253,11 +254,12 @@ def _setting(row: Any) -> str:
     if pd.isna(row.method):
         return NONE
     solve = "converged" if pd.isna(row.iterations) else f"$K = {_whole(row.iterations)}$"
+    solve += " (Newton)" if row.method == NEWTON else ""
     solve += ", accelerated" if str(row.method).endswith("anderson") else ""
     if row.part != REDUCED:
         return f"{_whole(row.simulated)} vertices, {solve}"
     skinning = 0 if pd.isna(row.skinning) else row.skinning
-    size = _whole(row.k) + (f" + {_whole(skinning)}" if skinning else "")
+    size = _whole(row.k - skinning) + (f" + {_whole(skinning)}" if skinning else "")
     trained = f"{_whole(row.training_motions)} trained"
     return rf"{size}, $\tau = {row.tolerance:g}$, {solve}, {trained}"
 
