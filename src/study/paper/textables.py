@@ -254,13 +254,13 @@ def _setting(row: Any) -> str:
     if pd.isna(row.method):
         return NONE
     solve = "converged" if pd.isna(row.iterations) else f"$K = {_whole(row.iterations)}$"
-    solve += " (Newton)" if row.method == NEWTON else ""
+    solve = solve.replace("$K", "$K_N") if row.method == NEWTON else solve
     solve += ", accelerated" if str(row.method).endswith("anderson") else ""
     if row.part != REDUCED:
         return f"{_whole(row.simulated)} vertices, {solve}"
     skinning = 0 if pd.isna(row.skinning) else row.skinning
     size = _whole(row.k - skinning) + (f" + {_whole(skinning)}" if skinning else "")
-    trained = f"{_whole(row.training_motions)} trained"
+    trained = f"$n = {_whole(row.training_motions)}$"
     return rf"{size}, $\tau = {row.tolerance:g}$, {solve}, {trained}"
 
 

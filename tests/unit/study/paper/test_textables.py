@@ -199,9 +199,9 @@ C1 beyond & all & $\le$ 0.050 & 0 of 0 & -- & -- & -- \\
   & 2 & 1 / 0 \\
 % settings accurate to a tenth and not too close, without those on the same mesh
 % frontier
-\texttt{bar\_a}, 9 & 30 + 10, $\tau = 0.01$, $K = 5$, 2 trained & 0.050 & 0.062 (0.12)
+\texttt{bar\_a}, 9 & 30 + 10, $\tau = 0.01$, $K = 5$, $n = 2$ & 0.050 & 0.062 (0.12)
   & 0.50 & 1200 & 2 / 1.5 / -- \\
- & 20, $\tau = 0.1$, converged (Newton), 1 trained & 0.020 & 0.062 (--)
+ & 20, $\tau = 0.1$, converged, $n = 1$ & 0.020 & 0.062 (--)
   & 0.75 & 90 & -- / -- / -- \\
 \texttt{bar\_a}, 9 & 4 vertices, $K = 3$, accelerated & 0.10 & 0.12 (0.25) & 1 & -- & -- \\
 """
