@@ -1,6 +1,5 @@
-"""Mesh of a scene, its full-order runs, and the snapshots and POD bases of its reduced groups."""
+"""Mesh of a scene, its full-order runs, and the snapshots of each reduced group."""
 
-import logging
 from pathlib import Path
 
 from pdrom.model.mesh.checks import check_mesh
@@ -9,13 +8,9 @@ from pdrom.model.mesh.types import save_mesh
 from pdrom.model.runs import run
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction import snapshots as sets
-from pdrom.reduction.basis import basis_of, save_basis
-from pdrom.reduction.method import BasisSpec
-from study.artifact.paths import BASIS, HELDOUT, KICK, MESH, SNAPSHOTS, STIFFNESS, TRAIN, File
+from study.artifact.paths import HELDOUT, KICK, MESH, SNAPSHOTS, STIFFNESS, TRAIN, File
 from study.artifact.reads import Setting, SourcesOf
 from study.experiments.kit.base import experiment, scene_of
-
-log = logging.getLogger(__name__)
 
 
 @experiment(
@@ -65,16 +60,3 @@ def snapshots(mesh: File, train: File, heldout: File, config: SceneConfig, out: 
     frames = sets.training_frames(scene.config.frames, scene.config.reduce[group].train)
     found = sets.collect(train.path, heldout.path, scene.group(group), scene.masses, frames)
     sets.save_snapshots(found, out.path)
-
-
-@experiment(
-    "POD of {group} in {scene} ({basis})",
-    reads={"snapshots": SNAPSHOTS, "spec": Setting("basis")},
-    writes={"out": BASIS},
-)
-def pod(snapshots: File, spec: BasisSpec, out: File) -> None:
-    """Compute the basis of ``spec`` from the training ``snapshots`` and save it to ``out``."""
-    data = sets.load_snapshots(snapshots.path)
-    basis = basis_of(data, spec)
-    log.info("numerical rank %d of %d snapshots", basis.rank, len(data.train))
-    save_basis(basis, out.path)

@@ -20,6 +20,7 @@ import pandas as pd
 from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.store import atomic_path, read_table
 from pdrom.core.yamlfile import read_yaml
+from pdrom.model.held_out import MOTIONS
 from study.artifact.logs import usage_of
 from study.artifact.paths import TABLE
 from study.artifact.reads import RECORD
@@ -112,6 +113,8 @@ def updated(word: str) -> dict[Path, pd.DataFrame]:
             used = map(usage_of, Path(extended, "logs", alternatives.name).rglob("*.log"))
             made = {"code": [code_of_rows()], "took": [minutes(sum(u.wall for u in used if u))]}
             columns = {n: recordable(declared()[n].columns) for n in KEPT}
+            runs = tables[alternatives.name]  # validation motions have chosen models: `frontier`
+            tables[alternatives.name] = runs[runs.motion.isin(MOTIONS)]
             rows = {Path(RECORD.format(n)): t[columns[n]] for n, t in tables.items()}
             return rows | {MADE: pd.DataFrame(made)}
     known = choices(word, ["costs", "replication", "rows"])
