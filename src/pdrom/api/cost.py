@@ -1,4 +1,4 @@
-"""What accuracy costs: settings of a scene as points of error and time."""
+"""Settings of a scene, from iterations to coarser meshes and models, by error and time."""
 
 import logging
 import os

@@ -65,7 +65,7 @@ def selected_by_fit(rows: pd.DataFrame) -> np.ndarray:
 
 
 class Context:
-    """What the expected ``tables`` and the ``found`` table of runs show about all tables.
+    """Facts on all tables that the expected ``tables`` and the ``found`` table of runs show.
 
     chaotic : scenes with frames beyond the horizon of predictability
     modes : (scene, constraint group) -> number of modes above round-off
