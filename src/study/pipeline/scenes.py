@@ -15,7 +15,6 @@ from pdrom.core.store.checksum import digest_of
 from pdrom.core.yamlfile import ConfigModel, named, read_yaml, validate
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects import EFFECTS
-from pdrom.model.effects.base import Seed, effect_config
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.mesh.files import VARIABLE
 from pdrom.model.scene import Scene, SceneConfig
@@ -34,36 +33,10 @@ class Coarsen(ConfigModel):
 
     def of(self, scene: SceneConfig) -> SceneConfig:
         """Return ``scene`` with fewer vertices and frames."""
-        return scene if self == Coarsen() else scene.coarsened(self.resolution, self.frames)
+        return scene if self == UNCHANGED else scene.coarsened(self.resolution, self.frames)
 
 
-class Replicate(ConfigModel):
-    """Changes that turn every scene into a new one, on which the rules of claims are tested again.
-
-    frames_factor : number that multiplies the frame numbers of handles, pins and schedules; below
-        1, the motion gets faster
-    kick : speed of random initial velocities, m/s, along the axes that the held-out motions use
-    seed : seed of these velocities; it is also added to the seeds of the held-out motions
-    """
-
-    frames_factor: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
-    kick: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
-    seed: Seed = 0
-
-    def of(self, scene: SceneConfig) -> SceneConfig:
-        """Return ``scene`` with these changes of speed, initial velocities and held-out seeds."""
-        if self == Replicate():
-            return scene
-        effects = [effect.with_frames_scaled(self.frames_factor) for effect in scene.effects]
-        held_out = scene.held_out
-        if self.kick:
-            kick = {"effect": "kick", "speed": self.kick, "seed": self.seed}
-            effects.append(effect_config(kick | {"axes": held_out.kick_axes}, len(effects)))
-        held_out = held_out.model_copy(update={"seed": (held_out.seed + self.seed) % 2**63})
-        return scene.model_copy(update={"effects": tuple(effects), "held_out": held_out})
-
-
-Change = Coarsen | Replicate
+UNCHANGED = Coarsen()
 
 
 def scene_names(root: Path) -> list[str]:
@@ -79,17 +52,19 @@ def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
             raise ConfigurationError(f"{key}: unknown scene '{name}'{choices(name, known)}")
 
 
-def checked_scene(root: Path, name: str, *changes: Change) -> tuple[SceneConfig, tuple[int, int]]:
-    """Check scene ``name`` below ``root``, with ``changes``, by building it, and log its warnings.
+def checked_scene(
+    root: Path, name: str, coarsen: Coarsen = UNCHANGED
+) -> tuple[SceneConfig, tuple[int, int]]:
+    """Check scene ``name`` below ``root`` by building it, and log its warnings.
 
     It is not built if an earlier command has built it by the same code from the same files, under
     the same limits of meshes. Returns its configuration and its numbers of vertices and elements.
     """
-    config, own = read_scene(root, name, *changes), io.StringIO()
+    config, own = read_scene(root, name, coarsen), io.StringIO()
 
     def build() -> tuple[int, int, list[str]]:
         with warnings_to(own, "%(message)s"):
-            scene = load_bound_scene(root, name, *changes)
+            scene = load_bound_scene(root, name, coarsen)
         elements = sum(group.elements for group in scene.groups)
         return scene.mesh.vertices, elements, own.getvalue().splitlines()
 
@@ -104,9 +79,9 @@ def checked_scene(root: Path, name: str, *changes: Change) -> tuple[SceneConfig,
     return config, (vertices, elements)
 
 
-def load_bound_scene(root: Path, name: str, *changes: Change) -> Scene:
-    """Read scene ``name`` below ``root``, apply ``changes``, and build it on its mesh."""
-    scene, source = read_scene(root, name, *changes), scene_file(root, name)
+def load_bound_scene(root: Path, name: str, coarsen: Coarsen = UNCHANGED) -> Scene:
+    """Read scene ``name`` below ``root``, apply ``coarsen``, and build it on its mesh."""
+    scene, source = read_scene(root, name, coarsen), scene_file(root, name)
     try:
         mesh = scene.mesh.build(root)
         bound = Scene.build(scene, mesh)
@@ -121,8 +96,8 @@ def load_bound_scene(root: Path, name: str, *changes: Change) -> Scene:
     return bound
 
 
-def read_scene(root: Path, name: str, *changes: Change) -> SceneConfig:
-    """Read the configuration of scene ``name`` below ``root`` and apply ``changes``.
+def read_scene(root: Path, name: str, coarsen: Coarsen = UNCHANGED) -> SceneConfig:
+    """Read the configuration of scene ``name`` below ``root`` and apply ``coarsen``.
 
     No mesh is built. The path of a mesh file becomes relative to ``root``.
     """
@@ -134,9 +109,7 @@ def read_scene(root: Path, name: str, *changes: Change) -> SceneConfig:
     if isinstance(scene.mesh, MeshFile):
         folder = path.parent.relative_to(root).as_posix()
         scene = scene.model_copy(update={"mesh": scene.mesh.below(folder)})
-    for change in changes:
-        scene = change.of(scene)
-    return scene
+    return coarsen.of(scene)
 
 
 def scene_file(root: Path, name: str) -> Path:

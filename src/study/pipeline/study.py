@@ -47,7 +47,6 @@ class StudySettings(ConfigModel):
     methods: Annotated[tuple[str, ...], Field(min_length=1)]
     ranks: Annotated[tuple[Rank, ...], Field(min_length=1)] = (6, 10, 20, "full")
     coarsen: scene_kit.Coarsen = scene_kit.Coarsen()
-    replicate: scene_kit.Replicate = scene_kit.Replicate()
     claim_sets: dict[str, tuple[SceneName, ...]] = Field(default_factory=dict)
     sensitivity: Sensitivity = Sensitivity()
     reference: Reference = Reference()
@@ -98,8 +97,6 @@ class Study:
         self.titles: dict[str, str] = {}  # name of a scene -> title, for tables and figures
         self.sizes: dict[str, tuple[int, int]] = {}  # scene -> numbers of vertices and elements
         self._known: dict[str, SceneConfig] = {}
-        # changes made to every scene read from config/scenes, in this order
-        self._changes = (settings.replicate, settings.coarsen)
         self.scenes = {name: self.scene(name) for name in settings.scenes}
         # an own study runs no large scenes of the full study
         others = {*self._full.online.scenes} if self.is_alone else ()
@@ -123,7 +120,9 @@ class Study:
         ConfigurationError if the file of the scene is missing or faulty.
         """
         if name not in self._known:
-            config, self.sizes[name] = scene_kit.checked_scene(self.root, name, *self._changes)
+            config, self.sizes[name] = scene_kit.checked_scene(
+                self.root, name, self.settings.coarsen
+            )
             self.titles[name] = config.title
             self._known[name] = config.model_copy(update={"title": name})
         return self._known[name]
@@ -186,7 +185,9 @@ class Study:
     def every_mesh(self) -> dict[str, MeshConfig]:
         """Identifier -> configuration, for meshes of scenes in config/scenes and in the study."""
         names = scene_kit.scene_names(self.root)
-        meshes = [scene_kit.read_scene(self.root, name, *self._changes).mesh for name in names]
+        meshes = [
+            scene_kit.read_scene(self.root, name, self.settings.coarsen).mesh for name in names
+        ]
         return {mesh.identifier: mesh for mesh in meshes} | self.meshes
 
     def basis(self, identifier: str) -> BasisSpec:

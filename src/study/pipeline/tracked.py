@@ -5,7 +5,9 @@
 costs : `config/reference/job_costs.csv` from the logs of the full and of the tiny study: for each
     kind of job, the mean processor seconds in both, and the longest time and largest memory, which
     the requests of `workflow/profiles/slurm` must cover
-replication : the file of the table `replication` from the claims of ``config/replication.yaml``
+frozen : the fingerprint of the code, the rules and the scenes of ``config/replication.yaml``
+replication : the recorded verdicts of ``config/replication.yaml``; refused if its fingerprint is
+    not the frozen one
 rows : tables of ``config/extended.yaml`` that other studies show, too; makes them first
 """
 
@@ -21,23 +23,27 @@ from pdrom.core.errors import ConfigurationError, PdromError, choices
 from pdrom.core.store import atomic_path, read_table
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.held_out import MOTIONS
+from pdrom.model.mesh.config import MeshFile
 from study.artifact.logs import usage_of
 from study.artifact.paths import TABLE
+from study.artifact.planned import plan
 from study.artifact.reads import RECORD
 from study.experiments.alternatives.experiment import alternatives
 from study.pipeline.commandline import one_line
-from study.pipeline.fingerprint import fingerprint
+from study.pipeline.fingerprint import digest, fingerprint
 from study.pipeline.folders import folders
 from study.pipeline.scenes import read_scene
 from study.pipeline.summary import minutes
 from study.tables import declared
-from study.tables.claims.claims import MEASURED, RECORDED, RULES
+from study.tables.claims.claims import COMMITS, MEASURED, RECORDED, RULES
 from study.tables.claims.rules import load_claims
 from study.tables.kit.results import recordable
 
 COSTS = Path("config/reference/job_costs.csv")
 COLUMNS = ["kind", "seconds", "coarse_seconds", "longest_s", "memory_mb"]
 KEPT = ("alternatives", "equal_error", "frontier")
+WORDS = ["costs", "frozen", "replication", "rows"]
+OTHERS = "config/replication.yaml"
 LONG, MADE = "config/extended.yaml", Path("config/reference/recorded/made.csv")
 
 
@@ -75,6 +81,37 @@ def recorded_verdicts(claims: Path, rules: Path) -> pd.DataFrame:
     return table.assign(rules=[loaded[claim].fingerprint for claim in table.claim])
 
 
+def code_of_replication() -> str:
+    """Two fingerprints: of all code, and of rules, settings and scenes of the study `OTHERS`."""
+    scenes = [read_scene(Path(), name) for name in read_yaml(Path(OTHERS))["scenes"]]
+    files = [f"config/{name}.yaml" for name in ("default", "methods", "claims", "replication")]
+    files += [f"config/scenes/{scene.name}.yaml" for scene in scenes]
+    files += [scene.mesh.path for scene in scenes if isinstance(scene.mesh, MeshFile)]
+    return f"{fingerprint(*plan()[0])[:16]} {digest(Path(), *files)}"
+
+
+def replicated(claims: Path) -> dict[Path, pd.DataFrame]:
+    """Map the files of the last replication to their content, with the verdicts in ``claims``.
+
+    Raises ConfigurationError if code, rules or scenes have changed since they were frozen.
+    """
+    commits, code = pd.read_csv(COMMITS, dtype=str), code_of_replication()
+    *_, name = commits.replication
+    if (kept := commits.code_frozen.iloc[-1]) != code:
+        raise ConfigurationError(f"{COMMITS}: {name}: frozen is '{kept}', which now is '{code}'")
+    commits.loc[commits.index[-1], "code_recorded"] = code
+    earlier = pd.read_csv(RECORDED, dtype=str).query("replication != @name")
+    verdicts = recorded_verdicts(claims, Path(RULES)).assign(replication=name)
+    return {Path(RECORDED): pd.concat([earlier, verdicts]), Path(COMMITS): commits}
+
+
+def frozen() -> pd.DataFrame:
+    """Return the table `COMMITS` with the present fingerprint for its last replication."""
+    commits = pd.read_csv(COMMITS, dtype=str)
+    commits.loc[commits.index[-1], "code_frozen"] = code_of_replication()
+    return commits
+
+
 def dated(path: Path, column: str) -> pd.DataFrame:
     """Return the table in the file ``path``; a new ``column`` has the day the file was changed."""
     day = datetime.fromtimestamp(path.stat().st_mtime, UTC).date().isoformat()
@@ -97,7 +134,7 @@ def outdated_rows() -> str | None:
 
 
 def updated(word: str) -> dict[Path, pd.DataFrame]:
-    """Map files to their new content, for "costs", "replication" or "rows"."""
+    """Map files to their new content, for one of `WORDS`."""
     study, tiny, replication, extended = (
         folders([f"config/{name}.yaml"], []).results
         for name in ("default", "tiny", "replication", "extended")
@@ -106,8 +143,9 @@ def updated(word: str) -> dict[Path, pd.DataFrame]:
         case "costs":
             return {COSTS: measured_costs(study, tiny)}
         case "replication":
-            claims = Path(TABLE.at(replication, name="claims"))
-            return {Path(RECORDED): recorded_verdicts(claims, Path(RULES))}
+            return replicated(Path(TABLE.at(replication, name="claims")))
+        case "frozen":
+            return {Path(COMMITS): frozen()}
         case "rows":
             tables = {n: dated(Path(TABLE.at(extended, name=n)), "recorded") for n in KEPT}
             used = map(usage_of, Path(extended, "logs", alternatives.name).rglob("*.log"))
@@ -117,7 +155,7 @@ def updated(word: str) -> dict[Path, pd.DataFrame]:
             tables[alternatives.name] = runs[runs.motion.isin(MOTIONS)]
             rows = {Path(RECORD.format(n)): t[columns[n]] for n, t in tables.items()}
             return rows | {MADE: pd.DataFrame(made)}
-    known = choices(word, ["costs", "replication", "rows"])
+    known = choices(word, WORDS)
     raise ConfigurationError(f"tracked: '{word}': unknown{known}")
 
 

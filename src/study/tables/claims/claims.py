@@ -24,9 +24,11 @@ VERDICTS = HOLDS, FAILS, DEPENDS, MACHINE, UNDECIDED, UNTESTED = (
     "holds", "does not hold", "depends", "depends on the machine", "cannot be decided",
     "not tested",
 )  # fmt: skip
+NOT_DECIDED = UNDECIDED, UNTESTED
 RULES = "config/claims.yaml"
 RERUNS = "reduced_reruns"
 RECORDED = "config/reference/replication/claims.csv"
+COMMITS = "config/reference/replication/commits.csv"
 MEASURED = [f"{name}{suffix}" for suffix in PARTS.values() for name in ("verdict", "measured")]
 
 
@@ -405,35 +407,47 @@ def _kept(
 
 
 @table(
-    title="Verdicts on another sample of the scenes, by the same rules",
+    title="Verdicts on other scenes, by the same rules",
     columns=(
+        text("replication", "its name in config/reference/replication/commits.csv"),
         text("claim", "its identifier in config/claims.yaml"),
         text("part", f"which verdict: {', '.join(PARTS)}"),
-        timed(text("verdict", f"of this study, one of: {', '.join(VERDICTS)}", compared="exact")),
-        text("verdict_replication", "of config/replication.yaml, recorded"),
+        timed(text("verdict", f"of this study, {ONE_OF}", compared="exact")),
+        text("verdict_replication", "the recorded verdict on the other scenes"),
+        timed(flag("decidable", "neither is one of the last two", compared="exact")),
         timed(flag("same", "the two agree", compared="exact")),
         timed(text("measured", "range of the tests that decide", compared="skipped")),
         text("measured_replication", "the same range there"),
         flag("rules_unchanged", "the rules are those by which the record was decided"),
         text("date", "day of the record"),
+        text("frozen", "commit with the rules, the scenes and the code, before the first run"),
+        text("recorded", "commit with the record"),
     ),
     reads={
         "claims": TableOf("claims"),
         "rules": ProjectFile(RULES),
         "recorded": ProjectFile(RECORDED),
+        "commits": ProjectFile(COMMITS),
     },
-    timed_cells=timed_parts("verdict", "same", "measured"),
+    timed_cells=timed_parts("verdict", "decidable", "same", "measured"),
 )
-def replication(claims: pd.DataFrame, rules: Path, recorded: Path) -> pd.DataFrame:
-    """Verdicts of ``claims`` beside those of file ``recorded``; a row per common claim and part."""
-    both = claims.merge(pd.read_csv(recorded), on="claim", suffixes=("", "_replication"))
+def replication(claims: pd.DataFrame, rules: Path, recorded: Path, commits: Path) -> pd.DataFrame:
+    """Verdicts of ``claims`` beside ``recorded`` ones; a row per replication, claim and part.
+
+    ``commits`` is a file with the hashes of commits for each replication.
+    """
+    others = pd.read_csv(recorded).merge(pd.read_csv(commits, dtype=str), on="replication")
+    both = others.merge(claims, on="claim", suffixes=("_replication", ""))
     fingerprints = {claim: rule.fingerprint for claim, rule in load_claims(rules).items()}
     both["rules_unchanged"] = both.rules == both.claim.map(fingerprints)
+    kept = ["replication", "claim", "rules_unchanged", "date", "frozen", "recorded"]
     rows = []
     for part, suffix in PARTS.items():
-        own = both[["claim", "rules_unchanged", "date"]].assign(part=part)
+        own = both[kept].assign(part=part)
         for name in ("verdict", "measured"):
             own[name] = both[f"{name}{suffix}"]
             own[f"{name}_replication"] = both[f"{name}{suffix}_replication"]
-        rows.append(own.assign(same=own.verdict == own.verdict_replication))
+        decided = [~own[name].isin(NOT_DECIDED) for name in ("verdict", "verdict_replication")]
+        same = own.verdict == own.verdict_replication
+        rows.append(own.assign(same=same, decidable=decided[0] & decided[1]))
     return pd.concat(rows, ignore_index=True)

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from pdrom.core.errors import PdromError
+from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.logs import Usage
@@ -20,7 +20,7 @@ from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
 from study.pipeline.tracked import COLUMNS, COSTS, measured_costs, recorded_verdicts, updated
 from study.tables import declared
-from study.tables.claims.claims import MEASURED, RECORDED, RULES, claims, replication
+from study.tables.claims.claims import COMMITS, MEASURED, RECORDED, RULES, claims, replication
 from study.tables.claims.rules import load_claims
 
 TABLE = pd.read_csv(ROOT / COSTS).set_index("kind")
@@ -135,16 +135,55 @@ def test_recorded_rows_have_no_times_and_are_outdated_if_code_changes(tmp_path, 
     assert "tracked rows (last time 1 min 35 s)" in str(tracked.outdated_rows())
 
 
-def test_another_verdict_is_not_the_same(tmp_path: Path) -> None:
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    """A recorded replication "first", and "second", which is not frozen yet, below `tmp_path`."""
+    (tmp_path / "config/reference").mkdir(parents=True)
+    for name in (*(ROOT / "config").glob("*.yaml"), ROOT / "config/scenes"):
+        (tmp_path / "config" / name.name).symlink_to(name)
     write_table(claims.checked(verdicts()), tmp_path / "claims.csv")
-    recorded = recorded_verdicts(tmp_path / "claims.csv", ROOT / RULES)
+    recorded = recorded_verdicts(tmp_path / "claims.csv", ROOT / RULES).assign(replication="first")
+    folder = (tmp_path / RECORDED).parent
+    folder.mkdir()
+    recorded.to_csv(folder / "claims.csv", index=False)
+    commits = pd.DataFrame({"replication": ["first", "second"], "frozen": ["aa", "bb"]})
+    commits.reindex(columns=[*commits, "recorded", "code_frozen", "code_recorded"]).to_csv(
+        folder / "commits.csv", index=False
+    )
+    return folder
+
+
+def test_another_verdict_is_not_the_same_and_none_is_not_counted(record: Path) -> None:
+    recorded = pd.read_csv(record / "claims.csv")
     assert re.fullmatch(r"20\d\d-\d\d-\d\d", recorded.date[0])
-    recorded.to_csv(tmp_path / "kept.csv", index=False)
-    today = verdicts(verdict_beyond="does not hold")
-    table = replication.checked(replication(today, ROOT / RULES, tmp_path / "kept.csv"))
+    recorded.assign(rules=["00000000", recorded.rules[1]]).to_csv(record / "claims.csv")
+    today = verdicts(verdict_beyond=["does not hold", "not tested"])
+    files = ROOT / RULES, record / "claims.csv", record / "commits.csv"
+    table = replication.checked(replication(today, *files))
     assert table.same.tolist() == [True, True, False, False]
-    assert table.rules_unchanged.all()
-    other = recorded.assign(rules=["00000000", recorded.rules[1]])
-    other.to_csv(tmp_path / "kept.csv", index=False)
-    table = replication(today, ROOT / RULES, tmp_path / "kept.csv")
+    assert table.decidable.tolist() == [True, True, True, False]
     assert table.rules_unchanged.tolist() == [False, True, False, True]
+    assert table.frozen.tolist() == ["aa"] * 4
+
+
+@pytest.mark.parametrize("change", ["code", "scene"])
+def test_a_record_is_refused_if_code_or_a_scene_changed_since_it_was_frozen(
+    record, tmp_path, monkeypatch, change
+):
+    monkeypatch.chdir(tmp_path)
+    updated("frozen")[Path(COMMITS)].to_csv(COMMITS, index=False)
+    made = tracked.replicated(tmp_path / "claims.csv")
+    assert made[Path(RECORDED)].replication.tolist() == 2 * ["first"] + 2 * ["second"]
+    assert made[Path(COMMITS)].iloc[-1, -1] == made[Path(COMMITS)].iloc[-1, -2]
+    if change == "code":
+        monkeypatch.setattr(tracked, "fingerprint", lambda *modules: "changed")
+    else:
+        monkeypatch.setattr(tracked, "OTHERS", "config/tiny.yaml")
+    with pytest.raises(ConfigurationError, match=r"csv: second: frozen is '\w{16} \w{16}'"):
+        tracked.replicated(tmp_path / "claims.csv")
+
+
+def test_code_rules_and_scenes_of_the_last_record_are_the_frozen_ones() -> None:
+    *_, last = pd.read_csv(ROOT / COMMITS, dtype=str).itertuples()
+    assert last.code_recorded == last.code_frozen
+    assert re.fullmatch("[0-9a-f]{8} [0-9a-f]{8}", f"{last.frozen} {last.recorded}")

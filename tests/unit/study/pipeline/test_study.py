@@ -11,7 +11,6 @@ from study.artifact import paths
 from study.experiments.kit.base import experiments
 from study.experiments.reruns import stability
 from study.pipeline.plan import Plan, check_live, check_subspaces
-from study.pipeline.scenes import Replicate, read_scene
 from study.pipeline.study import Study, StudySettings, labels_of
 
 STUDY = {"scenes": ["spring_oop", "strain_oop"], "methods": ["deim", "gappy"], "ranks": [6, "full"]}
@@ -50,21 +49,6 @@ def test_the_configurations_hold_what_they_ask_for(name):
     settings = validate(StudySettings, config, name)
     assert set(settings.stability.scenes) <= set(settings.scenes)
     assert set(settings.stability.ranks) <= set(settings.ranks)
-
-
-def test_a_replicated_scene_is_faster_and_starts_elsewhere() -> None:
-    change = Replicate(frames_factor=0.8, kick=0.1, seed=100)
-    base, scene = read_scene(ROOT, "bar_twist"), read_scene(ROOT, "bar_twist", change)
-    turns = [[e.over for e in s.effects if e.effect == "rotate"] for s in (base, scene)]
-    assert turns == [[100, 100], [80, 80]]
-    assert scene.effects[-1].model_dump() == {
-        "effect": "kick", "speed": 0.1, "seed": 100, "axes": ("x", "y", "z"),
-    }  # fmt: skip
-    assert scene.held_out.seed == base.held_out.seed + 100
-    assert (scene.frames, scene.mesh, scene.reduce) == (base.frames, base.mesh, base.reduce)
-    starts = [s.effects[-1].seed for s in (scene.heldout_variant("kick"),)]
-    assert starts == [102]
-    assert read_scene(ROOT, "bar_twist", Replicate()) == base
 
 
 @pytest.fixture
