@@ -11,11 +11,11 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 35_760,
+    "lines of src": 35_730,
     "lines of tests": 22_900,
     "words of documentation": 25_400,
     "tables": 27,
-    "figures": 24,
+    "figures": 23,
     "experiments": 20,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")

@@ -34,7 +34,7 @@ from pdrom.reduction.subspace.interpolation import SubspaceLocalStep
 from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 from pdrom.reduction.timing import Variant, measure
-from pdrom.view.page import LIVE, page_of, view_of
+from pdrom.view.page import LIVE, page_of, require_page, view_of
 
 FORMAT = 1  # version of the file of a model
 BUSY = 1.25  # wall time over processor time from which the processor counts as busy
@@ -185,8 +185,7 @@ class Model:
             is none, or of a scene that `run` refuses; the page is too large or cannot be written.
         """
         store.require_own(files.file_path(path))
-        if files.file_path(path).suffix.lower() not in (".html", ".htm"):
-            raise ConfigurationError(f"{path}: the name of a page ends in .html")
+        require_page(path)
         own, scene, positions = self.reduced, self.scene, None
         if not isinstance(own, SubspaceModel):
             raise NotReducibleError(f"{self.title} reduces projections: train without a method")

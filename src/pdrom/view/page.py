@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pdrom.core.errors import StorageError
+from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.packed import pack_positions, pack_text
 from pdrom.core.store import write_text
 from pdrom.model.effects.base import EffectConfig
@@ -69,7 +69,14 @@ LIVE = ("live.html", "live.css", "packed.js", "engine.js", "drawing.js", "live.j
 
 def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> None:
     """Write an HTML page of ``scenes`` to ``path``; StorageError if above `LARGEST` bytes."""
+    require_page(path)
     write_text(page_of(VIEWER, [pack_scene(scene) for scene in scenes]), path, with_checksum=False)
+
+
+def require_page(path: str | os.PathLike[str]) -> None:
+    """Raise ConfigurationError if ``path`` is not the name of a page."""
+    if not os.fspath(path).lower().endswith((".html", ".htm")):
+        raise ConfigurationError(f"{path}: the name of a page ends in .html")
 
 
 def page_of(parts: Sequence[str], scenes: Sequence[Mapping[str, Any]]) -> str:

@@ -1,15 +1,11 @@
 """Figures of the cost of a run: by phase, effect and mesh size, and of reduced local steps."""
 
-from itertools import cycle
-
 import numpy as np
 import pandas as pd
 
-from pdrom.core.store import read_table
 from pdrom.view import style
 from pdrom.view.artists import Artist, Axes, Figure
-from study.artifact.paths import CONTRIBUTIONS, File
-from study.artifact.reads import EachOf, TableOf
+from study.artifact.reads import TableOf
 from study.experiments.kit.base import GLOBAL, REST, RIGHT
 from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, figure, method_styles
 from study.figures.kit.multiples import label_outer, label_rows, plain_ticks, small_multiples
@@ -34,17 +30,10 @@ CURVES = {
 NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}
 SCALED = {"fom": (style.BLACK, "o"), "ecsw": ("#1B6E6E", ">")}
 ROOM = 2.6  # the axis ends at this multiple of the largest mesh size, to leave space for text
-FRAMES = ["effect", "frame", "force"]
 COLUMNS = 3  # panels in a row of figure `break_even`
-SHOWN = 3  # number of scenes whose forces are drawn
-LOW, HIGH = 1e-12, 1e2
-ROUNDOFF = 1e-14  # smallest drawn force relative to the largest force of the scene
-OTHERS = ("#8C6D31", "#5A5A5A", "#B03A6B", "#2B2B80", "#3E8E7E", "#A0522D", "#7F7F00")
-MARKERS = "*dph8H|"  # for effects that are no constraint groups; each group has a fixed marker
 UNLISTED = "forces, holds, contacts"
 COLOURS = {UNLISTED: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
 TICK = {"linestyle": "none", "marker": "|", "markersize": 9, "markeredgewidth": 1.4}
-Looks = dict[str, tuple[str, str]]
 ACTING = (
     "cloth_all_oop spring_oop bend_curved strain_oop strain_poke_twin spring_twist_twin "
     f"strain_twist_twin cloth_all cloth_all_twin bar_release bar_twist {MESHES}"
@@ -132,7 +121,7 @@ def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _draw_times(ax: Axes, rows: pd.DataFrame, looks: Looks) -> None:
+def _draw_times(ax: Axes, rows: pd.DataFrame, looks: dict[str, tuple[str, str]]) -> None:
     ax.set(xscale="log", yscale="log")
     ax.grid(True)
     for method, part in rows.groupby("method", sort=False):
@@ -180,72 +169,6 @@ def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
     one = style.handle("break-even", color=style.BLACK, linestyle="--")
     style.legend(figure, [*drawn.handles(styles), one], 3)
     return figure
-
-
-@figure(
-    title="What each effect contributes",
-    reads={"table": TableOf("effects_cost"), "contributions": EachOf(CONTRIBUTIONS, "experiments")},
-    scenes=ACTING,
-)
-def effects_contribution(drawn: Drawn, table: pd.DataFrame, contributions: list[File]) -> Figure:
-    """Left: norm of the force of each effect on the free vertices over the frames of a scene (of a
-    hold: on the vertices that it holds). Right: how far the run moves when an effect is left out,
-    before the horizon; the grey bar ends at the sensitivity floor, below which nothing can be told
-    from round-off. Open markers lie below the floor, at the left edge where nothing changes at all.
-    The only group of a scene cannot be left out.
-    """
-    table = table.dropna(subset=["force"])
-    scenes = drawn.scenes_of(table, "no contributions of effects")
-    rows = table[table.scene.isin(scenes)]
-    forces = {file["scene"]: read_table(file.path, FRAMES) for file in contributions}
-    shown = sorted(scenes, key=lambda scene: -len(drawn.of(scene)))[:SHOWN]
-    looks = _looks(drawn, rows[rows.moved.notna() | rows.scene.isin(shown)])
-    figure = style.new_figure(0.24 * len(scenes) + 2.0)
-    left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.15))
-    axes = left.subplots(len(shown), 1, squeeze=False)[:, 0]
-    for ax, scene in zip(axes, shown, strict=True):
-        _draw_forces(ax, forces[scene], looks)
-        ax.set_title(style.words(scene))
-    axes[-1].set_xlabel("frame")
-    axes[len(axes) // 2].set_ylabel("norm of the force (N)")
-    _draw_moved(right.subplots(), rows, scenes, looks)
-    named = {style.words(effect): look for effect, look in looks.items()}
-    style.legend(figure, style.handles(named, markersize=4.5), 6)
-    return figure
-
-
-def _looks(drawn: Drawn, rows: pd.DataFrame) -> Looks:
-    """Map effects in ``rows`` to (colour, marker); those of a group are the same in all figures."""
-    effects, looks = dict.fromkeys(rows.effect), zip(cycle(OTHERS), cycle(MARKERS), strict=False)
-    groups = {effect: drawn.looks[effect] for effect in effects if effect in drawn.looks}
-    others = (effect for effect in effects if effect not in groups)
-    return groups | dict(zip(others, looks, strict=False))
-
-
-def _draw_forces(ax: Axes, frames: pd.DataFrame, looks: Looks) -> None:
-    least = ROUNDOFF * frames.force.max()
-    for effect, rows in frames.groupby("effect", sort=False):
-        force = rows.force.where(rows.force > least)
-        colour, marker = looks[str(effect)]
-        alone = {"marker": marker, "markersize": 3.5} if len(rows) == 1 else {}
-        ax.plot(rows.frame, force, color=colour, **alone)
-    ax.set_yscale("log")
-    ax.grid(True)
-
-
-def _draw_moved(ax: Axes, rows: pd.DataFrame, scenes: list[str], looks: Looks) -> None:
-    for y, scene in enumerate(scenes):
-        own = rows[rows.scene == scene]
-        floor = float(own.sensitivity_floor.iloc[0])
-        ax.barh(y, floor - LOW, left=LOW, color="#DCD8D0", height=0.8, zorder=1)
-        for row in own[own.moved.notna()].itertuples():
-            colour, marker = looks[row.effect]
-            look = {"markersize": 4.5, "zorder": 3, "color": colour, "clip_on": False}
-            look["markerfacecolor"] = colour if row.above_floor else "white"
-            ax.plot([np.clip(row.moved, LOW, HIGH)], [y], marker, **look)
-    label_rows(ax, scenes)
-    ax.set(xscale="log", xlim=(LOW, HIGH), xlabel="drift of the run without the effect")
-    ax.grid(True)
 
 
 @figure(

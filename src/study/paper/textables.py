@@ -15,6 +15,7 @@ from study.experiments.alternatives.experiment import NEWTON
 from study.experiments.error_budget import PARTS
 from study.figures.kit.declaration import declarations
 from study.paper.macros import HIDDEN, format_number
+from study.tables.claims.claims import NOT_DECIDED
 from study.tables.equal_error import AHEAD, REDUCED, SAME
 from study.tables.kit.results import FAILED, MEASURES, MEDIAN, over_motions, trained
 
@@ -122,6 +123,19 @@ def claims_in_full(claims_tests: pd.DataFrame) -> Rows:
             opening = ["" if place else f"{claim} {_PARTS[part]}", escape(test.what), limit]
             spread = map(_known, (test.least, test.median, test.most))
             yield [*opening, f"{test.satisfied} of {test.of}", *spread]
+
+
+def replications(replication: pd.DataFrame) -> Rows:
+    """Verdicts of the study and of each replication; a dash where none is decided."""
+    names = list(replication.replication.unique())
+    heads = [cell for part in _PARTS.values() for cell in (f"{part}: study", *names)]
+    yield "l" * (1 + len(heads)), ["", *heads]
+    for claim, rows in replication.groupby("claim", sort=False):
+        cells = []
+        for part in _PARTS:
+            own = _rows(rows, part=part)
+            cells += [own.verdict.iloc[0], *own.verdict_replication]
+        yield [claim, *(NONE if cell in NOT_DECIDED else escape(cell) for cell in cells)]
 
 
 # Columns of the table of iterations: (method, number K of local-global iterations in a frame).
@@ -411,8 +425,9 @@ def stability(stability: pd.DataFrame) -> Rows:
 TEX_TABLES: dict[str, Callable[..., Rows]] = {
     f"tab_{make.__name__}": make
     for make in (
-        claims, claims_in_full, scenes, methods, ranks, reruns, local_share, stability, iterations,
-        positions, break_even, speedups, payoff, frontier, trajectories, error_budget,
+        claims, claims_in_full, replications, scenes, methods, ranks, reruns, local_share,
+        stability, iterations, positions, break_even, speedups, payoff, frontier, trajectories,
+        error_budget,
     )
 }  # fmt: skip
 

@@ -327,23 +327,6 @@ def test_a_speedup_that_is_doubtful_has_another_mark():
     assert [t.get_text() for t in same.get_xticklabels()] == ["a, 400", "a, 8,000"]
 
 
-def test_what_an_effect_moves_stands_beside_the_floor(study):
-    """Below the floor the marker is open; a group that cannot be left out has none."""
-    scenes, table = ("strain_oop", "cloth_all"), reference("effects_cost")
-    figure = study.draw("effects_contribution", scenes=scenes)
-    *forces, moved = figure.axes
-    assert [ax.get_title() for ax in forces] == ["cloth all", "strain oop"]
-    assert [t.get_text() for t in moved.get_yticklabels()] == ["strain oop", "cloth all"]
-    found = [(line.get_xdata()[0], line.get_markerfacecolor() == "white") for line in moved.lines]
-    rows = pd.concat([table[table.scene == scene] for scene in scenes])
-    rows = rows[rows.moved.notna()]
-    below = ~rows.above_floor.astype(bool)
-    assert found == list(zip(rows.moved.clip(lower=1e-12), below, strict=True))
-    assert set(below) == {True, False}
-    ends = [bar.get_x() + bar.get_width() for bar in moved.patches]
-    assert ends == pytest.approx(list(dict.fromkeys(rows.sensitivity_floor)))
-
-
 def test_a_scene_without_effects_ends_at_the_tick(study):
     shares = [(s, "gravity", 1.0, 1.0, None, None) for s in ("strain_oop", "cloth_all")]
     left_out = [("gravity", 3, 3.5), ("a + b", 1, 2.0), ("nothing", 3, 4.0)]

@@ -101,6 +101,13 @@ TABLES = {
         ("C1", "published", "aside", False, "<=", 0.1, 5, 6, 0.0, 0.5, 1.0),
         ("C1", "beyond", "all", True, "<=", 0.05, 0, 0, None, None, None),
     ).assign(margin=1.5),
+    "replication": frame(
+        "replication claim part verdict verdict_replication",
+        ("first", "C1", "published", "holds", "depends"),
+        ("first", "C1", "beyond", "not tested", "holds"),
+        ("second", "C1", "published", "holds", "holds"),
+        ("second", "C1", "beyond", "not tested", "cannot be decided"),
+    ),
     "speedups": frame(
         "scene method position_basis k r full_ms shown loses error_train "
         "error_heldout playback_error training_s reduction_s frames_to_break_even",
@@ -148,6 +155,9 @@ C3 & y & \textcolor{okred}{does not hold} (); both errors: depends
 C1 as published & some\_one & $\ge$ 0.10 & 1 of 2 & 0.050 & 0.10 & \ensuremath{\infty} \\
  & others & $\ge$ 0.10 & 3 of 4 & 0 & 0.50 & 1 \\
 C1 beyond & all & $\le$ 0.050 & 0 of 0 & -- & -- & -- \\
+% what is not decided
+% replications
+C1 & holds & depends & holds & -- & holds & -- \\
 % the horizon of a calm scene is its run
 % scenes
 \texttt{bar\_a} & triangle strain ($10^{7}$) & 400 & 722 & 10 & run & 2 & -- & -- \\
