@@ -14,7 +14,7 @@ from study.artifact.text import escape
 from study.experiments.alternatives.experiment import NEWTON
 from study.experiments.error_budget import PARTS
 from study.figures.kit.declaration import declarations
-from study.paper.macros import HIDDEN, format_number
+from study.paper.macros import format_number
 from study.tables.claims.claims import NOT_DECIDED
 from study.tables.equal_error import AHEAD, REDUCED, SAME
 from study.tables.kit.results import FAILED, MEASURES, MEDIAN, over_motions, trained
@@ -191,25 +191,6 @@ def positions(reduced_reruns: pd.DataFrame) -> Rows:
                 for basis, method, text in columns.values()
             ]
             yield [_name(scene), *cells]
-
-
-_METHODS = ("deim-joint", "block-deim", "gappy")
-
-
-def break_even(breakeven: pd.DataFrame) -> Rows:
-    """Basis size r from which on a reduced local step takes longer than the full one, by scene."""
-
-    def text(part: pd.DataFrame) -> str:
-        crossed = part.breakeven_r.dropna()
-        if part.empty or HIDDEN in breakeven.attrs:
-            return NONE
-        return "pays" if crossed.empty else _whole(crossed.max())
-
-    keys = ["scene", "group", "vertices"]
-    yield "llr" + "r" * len(_METHODS), [*keys, *map(escape, _METHODS)]
-    for (scene, group, vertices), part in breakeven.groupby(keys, sort=False):
-        cells = [text(_rows(part, method=method)) for method in _METHODS]
-        yield [_name(scene), _group(group), _whole(vertices), *cells]
 
 
 def speedups(speedups: pd.DataFrame) -> Rows:
@@ -426,7 +407,7 @@ TEX_TABLES: dict[str, Callable[..., Rows]] = {
     f"tab_{make.__name__}": make
     for make in (
         claims, claims_in_full, replications, scenes, methods, ranks, reruns, local_share,
-        stability, iterations, positions, break_even, speedups, payoff, frontier, trajectories,
+        stability, iterations, positions, speedups, payoff, frontier, trajectories,
         error_budget,
     )
 }  # fmt: skip
