@@ -11,7 +11,7 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 35_730,
+    "lines of src": 35_700,
     "lines of tests": 22_900,
     "words of documentation": 25_400,
     "tables": 27,

@@ -24,7 +24,7 @@ LEFT = r">{\raggedright\arraybackslash}"
 # Iterator over a table: first (column definitions, header), then the rows; all cells are TeX.
 Rows = Iterator[Any]
 # Tables that may break across pages.
-LONG = ("tab_scenes", "tab_trajectories", "tab_ranks", "tab_local_share", "tab_frontier")
+LONG = ("tab_scenes", "tab_trajectories", "tab_ranks", "tab_frontier")
 FULL = "full"  # value of column position_basis for runs with unreduced positions
 
 
@@ -370,15 +370,6 @@ def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
         yield [_name(scene), _group(group), *(_cell(run, text) for run in runs)]
 
 
-def local_share(local_share: pd.DataFrame) -> Rows:
-    """Time of a frame and the local step's share of it, by interpreted, NumPy and compiled code."""
-    yield "lrrrrrr", ["scene", "interp.\\ ms", "share", "NumPy ms", "share", "compiled ms", "share"]
-    for scene, part in local_share.groupby("scene", sort=False):
-        by = part.set_index("implementation")[["ms_per_frame", "local_share"]]
-        cells = by.loc[["interpreted", "numpy", "compiled"]].to_numpy().ravel()
-        yield [_name(scene), *map(format_number, cells)]
-
-
 _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
 
 
@@ -406,9 +397,8 @@ def stability(stability: pd.DataFrame) -> Rows:
 TEX_TABLES: dict[str, Callable[..., Rows]] = {
     f"tab_{make.__name__}": make
     for make in (
-        claims, claims_in_full, replications, scenes, methods, ranks, reruns, local_share,
-        stability, iterations, positions, speedups, payoff, frontier, trajectories,
-        error_budget,
+        claims, claims_in_full, replications, scenes, methods, ranks, reruns, stability,
+        iterations, positions, speedups, payoff, frontier, trajectories, error_budget,
     )
 }  # fmt: skip
 

@@ -447,7 +447,6 @@ def replication(claims: pd.DataFrame, rules: Path, recorded: Path, commits: Path
         for name in ("verdict", "measured"):
             own[name] = both[f"{name}{suffix}"]
             own[f"{name}_replication"] = both[f"{name}{suffix}_replication"]
-        decided = [~own[name].isin(NOT_DECIDED) for name in ("verdict", "verdict_replication")]
-        same = own.verdict == own.verdict_replication
-        rows.append(own.assign(same=same, decidable=decided[0] & decided[1]))
+        decidable = ~own[["verdict", "verdict_replication"]].isin(NOT_DECIDED).any(axis=1)
+        rows.append(own.assign(same=own.verdict == own.verdict_replication, decidable=decidable))
     return pd.concat(rows, ignore_index=True)
