@@ -26,7 +26,8 @@ CELLS: dict[str, Callable[[Mesh], np.ndarray]] = {
     "triangle": lambda mesh: mesh.triangles,
     "tetrahedron": lambda mesh: mesh.tetrahedra,
 }
-Weight = Annotated[float, Field(gt=0.0, le=1e16, allow_inf_nan=False)]
+LARGEST = 1e16  # weight
+Weight = Annotated[float, Field(gt=0.0, le=LARGEST, allow_inf_nan=False)]
 
 
 class WeightFactor(ConfigModel):
