@@ -32,6 +32,8 @@ def perform(arguments: argparse.Namespace) -> Status:
             lines += _hdf5(path, arguments.configuration)
         case ".csv":
             lines += _table(path)
+        case ".yaml" | ".yml":
+            lines += _effects(_scene(path))
         case ".json":
             lines += (f"  {line}" for line in path.read_text("utf-8").splitlines())
     lines.append("provenance:" if record else "provenance: unknown (no checksum says it)")
@@ -108,10 +110,36 @@ def _configuration(configuration: Any, whole: bool) -> Iterator[str]:
         text = yaml.safe_dump(configuration, sort_keys=False, width=100)
         yield from (f"  {line}" for line in text.splitlines())
         return
+    scene: dict[str, Any] = {}
     for name, value in configuration.items():
         if isinstance(value, dict) and {"name", "title"} <= value.keys():  # settings of a scene
-            value = f"{value['name']} ({value['title']})"
+            scene, value = value, f"{value['name']} ({value['title']})"
         yield f"  {name}: {_short(value)}"
+    yield from _effects(scene)
+
+
+def _scene(path: Path) -> dict[str, Any]:
+    """Return a scene's settings as they are understood, from its YAML file; {} of another file."""
+    from pdrom.core.yamlfile import named, read_yaml, validate
+    from pdrom.model.scene import SceneConfig
+
+    keys = named(read_yaml(path), path.stem)
+    scene = isinstance(keys, dict) and "effects" in keys
+    return validate(SceneConfig, keys, str(path)).model_dump(mode="json") if scene else {}
+
+
+def _effects(scene: dict[str, Any]) -> Iterator[str]:
+    """Yield a line for each effect of a ``scene``: its keys with values and units."""
+    from pdrom.core import config_file
+    from pdrom.core.yamlfile import read_yaml
+
+    yield from ["effects:"] if scene else []
+    words = read_yaml(config_file("words.yaml"))
+    for own in scene.get("effects", ()):
+        known = words.get(f"effect {own['effect']}", {})
+        given = [key for key in known if own.get(key) not in (None, [])]
+        told = ", ".join(f"{key} {own[key]} {known[key][0]}".rstrip() for key in given)
+        yield f"  {_short(own['effect'] + ': ' + told)}"
 
 
 def _table(path: Path) -> Iterator[str]:

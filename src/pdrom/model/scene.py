@@ -82,21 +82,14 @@ class SceneConfig(ConfigModel):
     reduce: dict[str, ReductionPlan] = Field(default_factory=dict)
     held_out: HeldOut = HeldOut()
 
-    @model_validator(mode="before")
-    @classmethod
-    def _without_error(cls, keys: Any) -> Any:
-        plans = keys.get("reduce") if isinstance(keys, dict) else None
-        if isinstance(plans, dict) and "error" in plans:
-            raise ValueError("reduce.error: runs within a requested error are gone")
-        return keys
-
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         groups = self.groups
         if not groups:
             raise ValueError("effects list no constraint group: there is nothing to project")
         if len(set(groups)) < len(groups):
-            raise ValueError(f"effects list a constraint group twice: {', '.join(groups)}")
+            added = "; young with poisson adds volume or area"
+            raise ValueError(f"effects list a constraint group twice: {', '.join(groups)}{added}")
         for effect in self.effects:
             effect.check_step(self.time_step)
         for group, plan in self.reduce.items():

@@ -26,8 +26,7 @@ CELLS: dict[str, Callable[[Mesh], np.ndarray]] = {
     "triangle": lambda mesh: mesh.triangles,
     "tetrahedron": lambda mesh: mesh.tetrahedra,
 }
-LARGEST = 1e16  # weight
-Weight = Annotated[float, Field(gt=0.0, le=LARGEST, allow_inf_nan=False)]
+Weight = Annotated[float, Field(gt=0.0, le=1e16, allow_inf_nan=False)]
 
 
 class WeightFactor(ConfigModel):

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from pdrom.model.compiled.rows import at
-from pdrom.model.constraints import lanes, material, singular_values, svd3
+from pdrom.model.constraints import lanes, singular_values, svd3
 from pdrom.model.constraints.base import GroupConfig, require_cells
 from pdrom.model.constraints.lanes import LANES, choose, cross, dot, mix, scaled, square_distance
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
@@ -196,5 +196,4 @@ class DeformationGradient(TetrahedronGroup):
 
         effect: Literal["deformation_gradient"] = "deformation_gradient"
 
-    Material = material.Solid
     allowed = (1.0, 1.0)

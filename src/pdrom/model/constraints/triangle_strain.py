@@ -11,18 +11,17 @@ nearly rank deficient ("flat"), a one-sided Jacobi rotation is used instead (mod
 k of a stored matrix is column k of F (S q = F^T). See module `lanes` for the layout.
 """
 
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
 from pdrom.model.compiled.rows import at
-from pdrom.model.constraints import lanes, material, singular_values
+from pdrom.model.constraints import lanes, singular_values
 from pdrom.model.constraints.base import require_cells
 from pdrom.model.constraints.lanes import LANES, choose, clamp, dot, load, mix, save, scaled
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import EDGE, ENERGY, FORCE, OPERATOR, SIZE, WEIGHT, F, P
 from pdrom.model.constraints.svd3 import rotated_pair
-from pdrom.model.effects.base import EffectConfig
 from pdrom.model.mesh.types import Mesh
 
 # F is nearly rank deficient if sigma_1 sigma_2 / ((sigma_1^2 + sigma_2^2) / 2) is below this
@@ -169,7 +168,6 @@ class TriangleStrain(singular_values.SingularValueGroup):
 
         effect: Literal["strain"] = "strain"
 
-    Material: ClassVar[type[EffectConfig] | None] = material.Sheet
     cells = "triangle"
     rows_per_element = 2
     work_size = WORK

@@ -129,7 +129,6 @@ class TriangleArea(triangle_strain.TriangleStrain):
 
         effect: Literal["area"] = "area"
 
-    Material = None
     work_size = AREA_WORK
     project_kernel = _project_area
     accumulate_kernel = _accumulate_area

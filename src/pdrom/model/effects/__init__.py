@@ -29,3 +29,8 @@ EFFECTS = Registry(
         "area": "pdrom.model.constraints.volume:TriangleArea",
     },
 )
+# Groups that may be given by a material in place of their weight.
+_MODULE = "pdrom.model.constraints.material"
+MATERIALS = Registry(
+    "material", {"deformation_gradient": f"{_MODULE}:Solid", "strain": f"{_MODULE}:Sheet"}
+)

@@ -17,7 +17,7 @@ group                                                               `pdrom.model
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -25,13 +25,11 @@ from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError
 
 from pdrom.core.errors import ConfigurationError
 from pdrom.core.yamlfile import ConfigModel, describe, shown
-from pdrom.model.effects import EFFECTS
+from pdrom.model.effects import EFFECTS, MATERIALS
 from pdrom.model.mesh.types import Length, Mesh
 
 # A vertex inside an obstacle by at most this fraction of the mesh's longest side only touches it.
 TOUCHING = 1e-6
-# An entry of a constraint group with one of these keys describes its material, not its weight.
-MATERIAL = {"young", "poisson", "thickness"}
 
 
 class ScaledWithFrames:
@@ -60,9 +58,8 @@ class EffectConfig(ConfigModel):
                 changes[name] = max(1, round(value * factor))
         return self.model_copy(update=changes)
 
-    def parts(self, beside: Collection[str]) -> tuple["EffectConfig", ...]:
-        """Return the effects that it stands for in a scene with effects of the names ``beside``;
-        ValueError if it excludes one of them. Only a material stands for others than itself."""
+    def parts(self) -> tuple["EffectConfig", ...]:
+        """Return the effects that this one stands for: itself, or the groups of a material."""
         return (self,)
 
     def check_step(self, time_step: float) -> None:
@@ -92,8 +89,6 @@ class Effect(ABC):
     """An effect bound to a mesh. ``Config`` is the typed configuration of the class."""
 
     Config: type[EffectConfig]
-    Material: ClassVar[type[EffectConfig] | None] = None
-    """Typed configuration with a material in place of the weight, for groups that have one."""
 
     in_subspace: ClassVar[bool] = True
     """Whether the effect is supported in a position subspace (an error is raised otherwise)."""
@@ -236,25 +231,25 @@ def effect_config(entry: Any, index: int) -> EffectConfig:
         return entry
     if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
         raise ValueError(f"effects[{index}] = {shown(entry, 60)}: a mapping with a key 'effect'")
+    name = entry["effect"]
     try:
-        kind = EFFECTS.load(entry["effect"])
+        model = EFFECTS.load(name).Config
     except ConfigurationError as error:
         raise ValueError(f"effects[{index}]: {error}") from error
-    with_material = kind.Material and MATERIAL & entry.keys()
-    model = kind.Material if with_material else kind.Config
+    if name in MATERIALS and {"young", "poisson", "thickness"} & entry.keys():
+        model = MATERIALS.load(name)
     try:
         return model.model_validate(entry)
     except ValidationError as error:
         fault = describe(error, model)
-        raise ValueError(f"effects[{index}] ({entry['effect']}): {fault}") from error
+        raise ValueError(f"effects[{index}] ({name}): {fault}") from error
 
 
 def _typed(entries: Any) -> tuple[EffectConfig, ...]:
     if not isinstance(entries, (list, tuple)):
         raise ValueError("a list of effects is required")
     configs = [effect_config(entry, index) for index, entry in enumerate(entries)]
-    names = [config.effect for config in configs]
-    return tuple(part for config in configs for part in config.parts(names))
+    return tuple(part for config in configs for part in config.parts())
 
 
 EffectConfigs = Annotated[tuple[SerializeAsAny[EffectConfig], ...], BeforeValidator(_typed)]

@@ -27,7 +27,7 @@ from pdrom.core.store.checksum import BLOCK
 from pdrom.core.yamlfile import read_yaml
 from pdrom.model.constraints.base import WeightFactor
 from pdrom.model.dynamics.stepper import FrameReport
-from pdrom.model.effects import EFFECTS
+from pdrom.model.effects import EFFECTS, MATERIALS
 from pdrom.model.effects.keyframes import Key
 from pdrom.model.mesh.config import BarMesh, ClothMesh, MeshFile
 from pdrom.model.mesh.generators import bar, cloth
@@ -69,8 +69,9 @@ def test_a_scene_is_run_a_model_trained_and_run_and_all_is_shown(folder, capsys)
     assert run(["view", "small_small.h5", "small.h5"]) == Status.DONE
     assert not list(folder.glob(".*"))  # no hidden file beside a user's own
     capsys.readouterr()
-    assert run(["show", "small.model.h5"]) == Status.DONE
+    assert run(["show", "small.yaml"]) == run(["show", "small.model.h5"]) == Status.DONE
     shown = capsys.readouterr().out
+    assert shown.count("  spring: weight 100000.0 N/m\n") == 2
     for words in ("intact", "model/columns/B: 30 x", "format: 1", "scene: small"):
         assert words in shown
     assert run(["show", "small.h5", "--configuration"]) == Status.DONE
@@ -282,6 +283,7 @@ SECTIONS = {
     "scene": SceneConfig, "masses": MassConfig, "reduce": ReductionPlan, "held_out": HeldOut,
     "factors": WeightFactor, "keys": Key, "mesh kind cloth": ClothMesh, "mesh kind bar": BarMesh,
     "mesh kind file": MeshFile, **{f"effect {name}": EFFECTS.load(name).Config for name in EFFECTS},
+    **{f"material {name}": MATERIALS.load(name) for name in MATERIALS},
     **{f"select kind {kind.model_fields['kind'].default}": kind for kind in Shape.__subclasses__()},
 }  # fmt: skip
 
