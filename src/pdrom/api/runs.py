@@ -11,15 +11,16 @@ import numpy as np
 from numba.core import event
 
 from pdrom.api import files
-from pdrom.api.records import Run, stored_run
+from pdrom.api.records import FULL, Run, stored_run
 from pdrom.core import config_file
 from pdrom.core.errors import ConfigurationError, SnapshotError, choices
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5
 from pdrom.core.yamlfile import shown, validate
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.stepper import FrameReport
+from pdrom.model.dynamics.stepper import PHASES, FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
+from pdrom.model.effects.base import Anchors, held_path
 from pdrom.model.runs import run as run_full_order
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, group_basis
@@ -29,6 +30,7 @@ from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.snapshots import training_frames
 
 log = logging.getLogger(__name__)
+ACTING = ("iterations", "anderson_window", "vertex_mass", "masses", "effects")  # keys of a scene
 SNAPSHOTS = 100  # largest number of training snapshots of a group if the scene sets none
 
 
@@ -50,6 +52,8 @@ def run(
     scene: Scene,
     out: str | os.PathLike[str] | None = None,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
+    start: Run | None = None,
+    frame: int | None = None,
 ) -> Run:
     """Run a scene in full order; snapshots of every group are stored for the training of a basis.
 
@@ -61,38 +65,88 @@ def run(
     scene : scene made by `build_scene` or `load_scene`
     out : file (HDF5) to write; None writes no file
     on_frame : called after each frame with its number, from 0, and the solver's report
+    start : run on the same mesh that goes on in ``scene``; its frames are kept
+    frame : number of frames of ``start`` that are kept (None: all). Frame numbers, also those of
+        holds, go on from there. A hold that ``start`` does not have begins there
 
     Returns
     -------
     Run
-        Positions and milliseconds of every frame, snapshots of every group.
+        Positions and milliseconds of every frame, snapshots of every group (of frames that were
+        computed here). If ``start`` ran with other settings, ``method`` says so.
 
     Raises
     ------
     ConfigurationError, StorageError
-        ``scene`` is no scene; ``out`` cannot be written, which is checked before the run.
+        ``scene`` is no scene; ``start`` has another mesh or time step, or no such frame; ``out``
+        cannot be written, which is checked before the run.
     """
     files.require_runnable(scene, out, on_frame)
+    begun, method = _begun(scene, start, frame)
     scene.log_holds()
     scene.log_contacts()
     count, plans = scene.config.frames, scene.config.reduce
     usual = min((count + 1) // 2, SNAPSHOTS)
-    frames = {
+    numbers = {
         group: training_frames(count, plans[group].train if group in plans else usual)
         for group in scene.config.groups
     }
+    frames = {group: own[own >= len(begun)] for group, own in numbers.items()}
     config = scene.config.model_dump(mode="json")
     reported = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
+    if start is not None:
+        reported["start"] = f"frame {len(begun)} of {start.title}"
     with made_by("pdrom.api.run", reported), ExitStack() as kept:
         # without ``out``, the run is written to a temporary folder that is deleted afterwards
         folder = "" if out else kept.enter_context(TemporaryDirectory(prefix="pdrom-"))
         path = Path(out or Path(folder, "run.h5"))
         with event.install_listener("numba:compile", _Compilation(scene.config.name)) as compiled:
-            run_full_order(scene, path, frames, with_mesh=True, on_frame=on_frame)
+            run_full_order(scene, path, frames, True, on_frame, begun, method)
         if compiled.done:
             log.info("%s: kernels compiled in %.1f s", scene.config.name, compiled.duration)
         with open_hdf5(path) as file:
             return stored_run(scene, file)
+
+
+def _begun(
+    scene: Scene, start: Run | None, frame: int | None
+) -> tuple[list[tuple[State, FrameReport]], str | None]:
+    """Return states and reports of the frames of ``start`` that are kept, and the new method."""
+    if start is None:
+        if frame is not None:
+            raise ConfigurationError("frame: only of a run that goes on (start)")
+        return [], None
+    own, h = files.require_run(start, "start").scene, scene.config.time_step
+    for key in ("points", "triangles", "tetrahedra"):
+        found, needed = getattr(own.mesh, key), getattr(scene.mesh, key)
+        if not np.array_equal(found, needed):
+            fault = f"other {key} ({len(found)}) than the scene ({len(needed)})"
+            raise ConfigurationError(f"start: {start.title} has {fault}: another mesh")
+    if own.config.time_step != h:
+        fault = f"has time_step = {own.config.time_step:g}, the scene {h:g}"
+        raise ConfigurationError(f"start: {start.title} {fault}; it goes on with the same one")
+    n, frames = len(start.ms) if frame is None else frame, scene.config.frames
+    last = min(len(start.ms), frames - 1)
+    if not isinstance(n, (int, np.integer)) or not 1 <= n <= last:
+        ends = f"the run has {len(start.ms)} frames, and the scene ends after frames = {frames}"
+        raise ConfigurationError(f"frame = {shown(n, 60)}: allowed are 1 to {last}, as {ends}")
+    q, anchors = start.positions[: n + 1].astype(float), Anchors()
+    for k in range(n):
+        *_, anchors = held_path(own.boundaries, range(k, k + 1), q[k], anchors)
+    # a hold is the same if at most its end differs
+    configs = (
+        [b.config.model_copy(update={"until": None}) for b in s.boundaries] for s in (own, scene)
+    )
+    had, has = configs
+    anchors = tuple(anchors[had.index(hold)] if hold in had else None for hold in has)
+    seconds = np.outer(1e-3 * start.ms, np.eye(len(PHASES))[-1])  # in one phase
+    begun = [
+        (State(after, (after - before) / h, anchors), FrameReport(np.full(1, np.nan), spent))
+        for before, after, spent in zip(q, q[1:], seconds, strict=False)
+    ]
+    same = all(getattr(own.config, key) == getattr(scene.config, key) for key in ACTING)
+    whole = same and start.method == FULL
+    return begun, None if whole else f"continuing {start.title} from frame {n}"
 
 
 def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:

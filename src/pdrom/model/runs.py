@@ -2,7 +2,7 @@
 
 import logging
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from time import perf_counter
@@ -128,6 +128,8 @@ def run(
     snapshot_frames: Mapping[str, np.ndarray],
     with_mesh: bool = False,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
+    begun: Sequence[tuple[State, FrameReport]] = (),
+    method: str | None = None,
 ) -> None:
     """Run a scene; write positions, velocities, objective, timings and the requested snapshots.
 
@@ -138,6 +140,8 @@ def run(
     with_mesh : whether the mesh is written, too, so that the file can be used without the scene
     on_frame : called after each frame with its number and report
     path : HDF5 file that is written
+    begun : states and reports after the first frames, which are not computed then
+    method : description of a run that does not begin at the initial state of ``scene``
     """
     frames = scene.config.frames
     loop, state = scene.stepper(), scene.initial_state()
@@ -159,8 +163,10 @@ def run(
         recorder = _SnapshotRecorder(file, loop, snapshot_frames)
         series["positions"][0], series["velocities"][0] = state.positions, state.velocities
         for frame in range(frames):
-            watch = recorder.observer(frame)
-            state, report = loop.step(state, frame, watch)
+            if frame < len(begun):
+                state, report = begun[frame]
+            else:
+                state, report = loop.step(state, frame, recorder.observer(frame))
             series["positions"][frame + 1] = state.positions
             series["velocities"][frame + 1] = state.velocities
             series["objective"][frame] = report.objective
@@ -169,6 +175,8 @@ def run(
             if (frame + 1) % max(1, frames // 10) == 0:
                 log.info("%s: frame %d of %d", scene.config.name, frame + 1, frames)
         file.attrs["factorisations"] = scene.system.factorisations
+        if method is not None:
+            file.attrs["method"] = method
 
 
 class _SnapshotRecorder:
