@@ -1,7 +1,7 @@
 """The run of a scene, in full order or with a model, its errors, and its arrays in a file."""
 
 from dataclasses import dataclass, field, is_dataclass
-from functools import cache
+from functools import cache, reduce
 from typing import Annotated, Any, cast, get_type_hints
 
 import h5py
@@ -12,6 +12,7 @@ from pdrom.core.errors import ConfigurationError, SnapshotError
 from pdrom.core.packed import brief
 from pdrom.core.store import require_finite
 from pdrom.core.yamlfile import shown, validate
+from pdrom.model.effects.base import held_vertices
 from pdrom.model.mesh.types import store_mesh
 from pdrom.model.metrics import deformation_error, trajectory_error
 from pdrom.model.scene import Scene
@@ -51,7 +52,7 @@ class Snapshots:
 
 
 FULL = "full order"
-STILL = 1e-9  # a body that moves by less than this fraction of its coordinates' range stands still
+STILL = 1e-6  # a body stands still if no coordinate changes by more than this part of its extent
 
 
 @dataclass(frozen=True)
@@ -60,13 +61,17 @@ class Errors:
 
     position : of the positions, relative to the reference's displacements; None if it stands still
     deformation : of the shapes, see `pdrom.model.metrics.deformation_error`; None of a rigid body
+    still : says, if there are no errors since the reference stands still, how little it moves
     """
 
     position: float | None
     deformation: float | None
     reference: str
+    still: str = ""
 
     def __str__(self) -> str:
+        if self.still:
+            return f"no errors against {self.reference}: {self.still}"
         shown = ["none" if e is None else f"{e:.2g}" for e in (self.position, self.deformation)]
         errors = f"errors {shown[0]} (positions) and {shown[1]} (deformation)"
         return f"{errors} against {self.reference}"
@@ -147,13 +152,13 @@ class Run:
         self.require_comparable(reference)
         if self.blowup_frame is not None or reference.blowup_frame is not None:
             return Errors(None, None, reference.title)
+        if still := standstill(reference.scene, reference.positions):
+            return Errors(None, None, reference.title, still)
         moved, other = self.positions[1:], reference.positions[1:]
         rest, masses = self.scene.mesh.points, reference.scene.masses
         distance, moved_by = self.differences(reference), displacement_norms(reference.positions)
-        shape, still = deformation_error(moved, other, rest, masses), np.abs(np.ptp(rest)) * STILL
-        moves = moved_by.max(initial=0.0) > still * np.sqrt(len(rest))
-        position = trajectory_error(distance, moved_by) if moves else None
-        return Errors(position, shape, reference.title)
+        shape = deformation_error(moved, other, rest, masses)
+        return Errors(trajectory_error(distance, moved_by), shape, reference.title)
 
     def errors(self, reference: "Run") -> np.ndarray:
         """Error (F',) of the positions in each frame, relative to the RMS displacement."""
@@ -178,6 +183,23 @@ class Run:
             if not same:
                 fault = f"another {name} than {reference.title}: errors compare runs frame by frame"
                 raise ConfigurationError(f"{self.title}: {fault}")
+
+
+def standstill(scene: Scene, positions: np.ndarray) -> str:
+    """Say how little the ``positions`` (F + 1, N, 3) m of a run of ``scene`` change; "" if they do.
+
+    Vertices that are held in every frame do not count: nobody computes their positions.
+    """
+    held = (held_vertices(scene.boundaries, frame) for frame in range(len(positions) - 1))
+    free = np.setdiff1d(np.arange(scene.mesh.vertices), reduce(np.intersect1d, held))
+    if not len(free):
+        return "nothing is free to move: every vertex is held in every frame"
+    ends = positions.max(axis=0) - positions[0], positions[0] - positions.min(axis=0)
+    moved, least = float(np.maximum(*ends)[free].max()), STILL * scene.mesh.extent
+    if moved > least:
+        return ""
+    fault = f"nothing moves: no coordinate changes by more than {moved:.2g} m"
+    return f"{fault}, less than {STILL:g} of the mesh's extent ({least:.2g} m)"
 
 
 _SNAPSHOTS = ("p", "roundoff", "frames")

@@ -4,6 +4,7 @@ import logging
 import os
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,9 +12,9 @@ import numpy as np
 from numba.core import event
 
 from pdrom.api import files
-from pdrom.api.records import FULL, Run, stored_run
+from pdrom.api.records import FULL, STILL, Run, stored_run
 from pdrom.core import config_file
-from pdrom.core.errors import ConfigurationError, SnapshotError, choices
+from pdrom.core.errors import ConfigurationError, RankError, SnapshotError, choices
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5
 from pdrom.core.yamlfile import shown, validate
@@ -178,7 +179,8 @@ def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")
     data = full.snapshots[group]
     roundoff = float(np.linalg.norm(data.roundoff))
-    return group_basis(chosen, full.scene.masses, data.p, roundoff, spec)
+    made = group_basis(chosen, full.scene.masses, data.p, roundoff, spec)
+    return replace(made, origin=f"group '{group}'")
 
 
 def methods() -> dict[str, MethodSpec]:
@@ -192,10 +194,14 @@ def projections_model(
     """Model in which the projections of ``group`` are reduced to r modes by ``method``.
 
     ``group`` None is the scene's only group. Raises the errors of `basis`, and RankError if the
-    snapshots have fewer than r modes above round-off.
+    snapshots do not change, or have fewer than r modes above round-off.
     """
     chosen, spec = group_of(full.scene, group), method_spec(method)
     made = basis(full, chosen.name, spec)
+    p = full.snapshots[chosen.name].p
+    if (changes := np.ptp(p, axis=0).max()) <= STILL * (largest := np.abs(p).max()):
+        fault = f"its projections, of up to {largest:.2g}, change by at most {changes:.2g}"
+        raise RankError(f"group '{chosen.name}': {fault}: there is nothing to reduce")
     return ProjectionModel(chosen.name, Reduction(made, select(made, spec, r), spec, r=r))
 
 

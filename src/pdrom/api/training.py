@@ -12,7 +12,7 @@ from pydantic import Field
 
 from pdrom.api import files
 from pdrom.api.model import Model, OnFrame, Training, require_same_mesh, silent, worst_errors
-from pdrom.api.records import FULL, Run
+from pdrom.api.records import FULL, Run, standstill
 from pdrom.api.runs import group_of, method_spec, projections_model, run
 from pdrom.core.errors import ConfigurationError, NotReducibleError, SnapshotError
 from pdrom.core.store import require_finite
@@ -144,14 +144,15 @@ def train(
     ConfigurationError, SceneError, SnapshotError, RankError
         A wrong argument; runs of different meshes; too few modes or snapshots.
     NotReducibleError
-        No tried model is within ``error``, a training scene does not converge, or it has an effect
-        that no position subspace can simulate.
+        No tried model is within ``error``, a training scene does not converge or has an effect that
+        no position subspace can simulate, or nothing moves.
     """
     started = perf_counter()
     given, runs = locals(), [_full_order(one) for one in (full, *others)]
     asked = arguments(full.scene, given)
     drawn = _variations(full.scene, "validation", asked.validate_, VALIDATION)
     if method is not None or asked.group is not None:
+        _require_motion([full])
         reduced = projections_model(full, asked.group, method or METHOD, asked.r)
         done = Training((full.scene.config.name,), False, None, None, perf_counter() - started)
         tests = [_reference(scene, False, progress) for scene in drawn]
@@ -166,6 +167,7 @@ def train(
         references = [_reference(s, True, progress) for s in [*(one.scene for one in runs), *more]]
     else:
         references = [*runs, *(_reference(scene, False, progress) for scene in more)]
+    _require_motion(references)
     spent = perf_counter() - started
     tests = [_reference(scene, asked.converged, progress) for scene in drawn]
     tried: list[tuple[float, str]] = []
@@ -191,6 +193,14 @@ def _full_order(run: Any) -> Run:
         ended = "" if run.blowup_frame is None else f", which blew up in frame {run.blowup_frame}"
         raise ConfigurationError(f"full: {run.title}{ended}: a run in full order is required")
     return run
+
+
+def _require_motion(runs: Sequence[Run]) -> None:
+    """Raise NotReducibleError unless something moves in one of ``runs``."""
+    still = [standstill(run.scene, run.positions) for run in runs]
+    if all(still):
+        name = runs[0].scene.config.name
+        raise NotReducibleError(f"scene '{name}': {still[0]}; there is nothing to reduce")
 
 
 def _trained(

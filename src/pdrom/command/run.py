@@ -16,6 +16,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     import numpy as np
 
     from pdrom.api import load, load_model, load_scene, run
+    from pdrom.api.records import standstill
     from pdrom.command.progress import Progress
     from pdrom.core.errors import ConfigurationError
     from pdrom.model.mesh.checks import seams
@@ -49,6 +50,8 @@ def perform(arguments: argparse.Namespace) -> Status:
         f"{out}: {len(made.ms)} frames of {scene.mesh.vertices} vertices ({seams(scene.mesh)}), "
         f"{np.median(made.ms):.2f} ms a frame (median)\n"
     )
+    if still := standstill(scene, made.positions):
+        sys.stdout.write(f"{out}: {still}; there is nothing to reduce\n")
     if model and reference:
         sys.stdout.write(f"{_compared(model, made, reference)}\n")
     if made.blowup_frame is not None:

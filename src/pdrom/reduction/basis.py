@@ -54,6 +54,11 @@ class Basis:
 
     def truncated(self, r: int) -> np.ndarray:
         """Return the first r modes (3 e p, r); RankError if the basis has fewer modes."""
+        if not self.rank:
+            fault = (
+                f"the projections of the snapshots differ only by round-off ({self.roundoff:.1e})"
+            )
+            raise RankError(f"{self.origin}: {fault}: no basis exists, there is nothing to reduce")
         if not 1 <= r <= self.rank:
             raise RankError(
                 f"{self.origin}: r = {r}, the snapshots have numerical rank {self.rank} "
@@ -205,7 +210,8 @@ def _check(
     snapshots: np.ndarray, row_mass: np.ndarray, rows_per_element: int, spec: BasisSpec
 ) -> None:
     if snapshots.ndim != 3 or snapshots.shape[2] != 3 or len(snapshots) < 2:
-        raise SnapshotError(f"snapshots of shape {snapshots.shape}, required: (n >= 2, e p, 3)")
+        fault = f"snapshots of shape {snapshots.shape}, required: (n >= 2, e p, 3)"
+        raise SnapshotError(f"{fault}; a run of less than three frames has one snapshot")
     rows = snapshots.shape[1]
     if rows == 0 or rows % rows_per_element:
         raise SnapshotError(

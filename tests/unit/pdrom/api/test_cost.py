@@ -9,7 +9,13 @@ import pytest
 from builders import GRAVITY, LEFT, make_scene
 from pdrom import api
 from pdrom.api.pictures import plot_cost
-from pdrom.core.errors import ConfigurationError, PdromError, SceneError, SolverError
+from pdrom.core.errors import (
+    ConfigurationError,
+    NotReducibleError,
+    PdromError,
+    SceneError,
+    SolverError,
+)
 from pdrom.model import coarser
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.runs import converged_run
@@ -72,11 +78,12 @@ def test_two_coarser_meshes_estimate_the_error_of_the_mesh():
     assert set(one.vertices) == {169, 16}
 
 
-def test_a_body_that_is_rigid_or_at_rest_or_blows_up_has_no_such_errors(monkeypatch):
-    rigid, still = api.cost(sheet(GRAVITY, SPRING)), api.cost(sheet(LEFT, SPRING))
-    assert rigid.deformation_error.isna().all()
-    assert still.position_error.isna().all()
-    assert still.setting[still.best].tolist() == [still.setting[0]]
+def test_a_body_that_is_rigid_or_blows_up_has_no_such_errors_and_one_at_rest_is_refused(
+    monkeypatch,
+):
+    assert api.cost(sheet(GRAVITY, SPRING)).deformation_error.isna().all()
+    with pytest.raises(NotReducibleError, match="nothing to compare"):
+        api.cost(sheet(LEFT, SPRING))
     monkeypatch.setattr("pdrom.reduction.settings.BLOWUP_EXTENT", 0.1)
     table = api.cost(sheet())
     assert np.isinf(table[["position_error", "deformation_error"]]).all(axis=None)

@@ -154,13 +154,13 @@ def test_arguments_that_another_one_makes_meaningless_are_refused(full, model):
         api.reduce(full)
 
 
-def test_speeds_are_of_all_frames_and_a_file_holds_a_model_of_a_body_at_rest(tmp_path):
-    still = api.build_scene(effects=[SPRING], mesh=MESH, frames=4)
-    model = api.train(api.run(still), modes=4)
+def test_speeds_are_of_all_frames_and_a_file_holds_a_model_of_a_rigid_body(tmp_path):
+    rigid = api.build_scene(effects=[GRAVITY, SPRING], mesh=MESH, frames=4)
+    model = api.train(api.run(rigid), modes=4)
     assert model.training.residual == 0.0  # there are no equations to fit
-    assert model.validation[["position_error", "deformation_error"]].isna().all(axis=None)
-    model.save(tmp_path / "still.h5")
-    assert api.load_model(tmp_path / "still.h5").validation.equals(model.validation)
+    assert model.validation.deformation_error.isna().all()
+    model.save(tmp_path / "rigid.h5")
+    assert api.load_model(tmp_path / "rigid.h5").validation.equals(model.validation)
     made = []
 
     def measure(variants, warmup, repeats):
@@ -170,8 +170,38 @@ def test_speeds_are_of_all_frames_and_a_file_holds_a_model_of_a_body_at_rest(tmp
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("pdrom.api.model.measure", measure)
         patch.setattr("pdrom.api.model.process_time", lambda: 0.0)
-        assert model.speed(still) == {"ms": 2.0, "full_ms": 5.0, "speedup": 2.5, "busy": True}
+        assert model.speed(rigid) == {"ms": 2.0, "full_ms": 5.0, "speedup": 2.5, "busy": True}
     assert made == [(4, 1, 1, 3)] * 2
+
+
+EVERY = {"kind": "box", "lower": [-9] * 3, "upper": [9] * 3}
+ALL = [
+    {"effect": "pins", "select": EVERY},
+    {"effect": "translate", "select": EVERY, "offset": [0, 1, 0], "over": 3},
+]
+BENDING = {"effect": "bending", "weight": 0.1}
+NOTHING = {
+    "at rest": ([SPRING], {}, "nothing moves: no coordinate changes by more than .* m, less than"),
+    "no gravity": ([GRAVITY | {"acceleration": [0, 0, 0]}, LEFT, SPRING], {}, "nothing moves"),
+    "all held": ([GRAVITY, ALL[0], SPRING], {}, "every vertex is held"),
+    "all carried": ([GRAVITY, ALL[1], SPRING], {}, "every vertex is held"),
+    "flat": ([GRAVITY, LEFT, SPRING, BENDING], {"group": "bending"}, "'bending': .* round-off"),
+    "rigid": ([GRAVITY, SPRING], {"group": "spring"}, "'spring': its projections, .* change by"),
+    "one frame": ([GRAVITY, LEFT, SPRING], {"group": "spring"}, "one snapshot"),
+}
+
+
+@pytest.mark.parametrize("name", NOTHING)
+def test_nothing_to_reduce_is_said_in_words(name):
+    effects, keys, words = NOTHING[name]
+    full = api.run(api.build_scene(effects=effects, mesh=MESH, frames=1 if "one" in name else 8))
+    with pytest.raises(PdromError, match=words) as told:
+        api.train(full, **keys)
+    assert "1 to 0" not in str(told.value)
+    if "group" not in keys:
+        assert re.search("no errors against .* nothing", str(full.error(full)))
+        with pytest.raises(PdromError, match=words):
+            api.train(full, group="spring")
 
 
 def test_skinning_columns_and_several_runs_enlarge_the_space(full):
