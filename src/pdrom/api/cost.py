@@ -66,8 +66,7 @@ def cost(
     Raises
     ------
     ConfigurationError, SceneError, MeshError, StorageError, SolverError
-        A wrong argument or file; no coarser mesh; a model of another mesh; no convergence; no
-        motion.
+        A wrong argument or file; no coarser mesh; a model of another mesh; no convergence, motion.
     """
     files.require_runnable(scene, None, progress, "progress")
     for given, what in ((coarser, "coarser"), (models, "models")):
@@ -88,7 +87,7 @@ def cost(
             "nothing tells errors; a smaller time_step or smaller weights converge sooner"
         )
     if still := standstill(scene, reference):
-        raise NotReducibleError(f"scene '{name}': {still}; there is nothing to compare")
+        raise NotReducibleError(f"scene '{name}': {still}")
     truth, rows = Yardstick(scene, reference), []
     for number, setting in enumerate(tried, start=1):
         log.info("%s: setting %d of %d, %s", name, number, len(tried), setting.labels["setting"])

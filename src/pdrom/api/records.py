@@ -61,17 +61,13 @@ class Errors:
 
     position : of the positions, relative to the reference's displacements; None if it stands still
     deformation : of the shapes, see `pdrom.model.metrics.deformation_error`; None of a rigid body
-    still : says, if there are no errors since the reference stands still, how little it moves
     """
 
     position: float | None
     deformation: float | None
     reference: str
-    still: str = ""
 
     def __str__(self) -> str:
-        if self.still:
-            return f"no errors against {self.reference}: {self.still}"
         shown = ["none" if e is None else f"{e:.2g}" for e in (self.position, self.deformation)]
         errors = f"errors {shown[0]} (positions) and {shown[1]} (deformation)"
         return f"{errors} against {self.reference}"
@@ -153,7 +149,7 @@ class Run:
         if self.blowup_frame is not None or reference.blowup_frame is not None:
             return Errors(None, None, reference.title)
         if still := standstill(reference.scene, reference.positions):
-            return Errors(None, None, reference.title, still)
+            return Errors(None, None, f"{reference.title}; {still}")
         moved, other = self.positions[1:], reference.positions[1:]
         rest, masses = self.scene.mesh.points, reference.scene.masses
         distance, moved_by = self.differences(reference), displacement_norms(reference.positions)
@@ -192,14 +188,11 @@ def standstill(scene: Scene, positions: np.ndarray) -> str:
     """
     held = (held_vertices(scene.boundaries, frame) for frame in range(len(positions) - 1))
     free = np.setdiff1d(np.arange(scene.mesh.vertices), reduce(np.intersect1d, held))
-    if not len(free):
-        return "nothing is free to move: every vertex is held in every frame"
-    ends = positions.max(axis=0) - positions[0], positions[0] - positions.min(axis=0)
-    moved, least = float(np.maximum(*ends)[free].max()), STILL * scene.mesh.extent
-    if moved > least:
+    moved = float(np.abs(positions[:, free] - positions[0, free]).max(initial=0.0))
+    if moved > STILL * scene.mesh.extent:
         return ""
-    fault = f"nothing moves: no coordinate changes by more than {moved:.2g} m"
-    return f"{fault}, less than {STILL:g} of the mesh's extent ({least:.2g} m)"
+    size = f"{len(free)} free vertices move by at most {moved:.2g} m, below {STILL:g} of the extent"
+    return f"nothing moves: {size}; there is nothing to reduce"
 
 
 _SNAPSHOTS = ("p", "roundoff", "frames")

@@ -66,21 +66,21 @@ def run(
     scene : scene made by `build_scene` or `load_scene`
     out : file (HDF5) to write; None writes no file
     on_frame : called after each frame with its number, from 0, and the solver's report
-    start : run on the same mesh that goes on in ``scene``; its frames are kept
+    start : run on the same mesh, with the same time step, that goes on in ``scene``
     frame : number of frames of ``start`` that are kept (None: all). Frame numbers, also those of
-        holds, go on from there. A hold that ``start`` does not have begins there
+        holds, count on; a hold that ``start`` has not begins there
 
     Returns
     -------
     Run
-        Positions and milliseconds of every frame, snapshots of every group (of frames that were
-        computed here). If ``start`` ran with other settings, ``method`` says so.
+        Positions and milliseconds of every frame, snapshots of every group, not of kept frames.
+        If ``start`` ran with other settings, ``method`` says so.
 
     Raises
     ------
     ConfigurationError, StorageError
-        ``scene`` is no scene; ``start`` has another mesh or time step, or no such frame; ``out``
-        cannot be written, which is checked before the run.
+        ``scene`` is no scene; ``start`` does not suit it or has no such frame; ``out`` cannot be
+        written, which is checked before the run.
     """
     files.require_runnable(scene, out, on_frame)
     begun, method = _begun(scene, start, frame)
@@ -88,21 +88,19 @@ def run(
     scene.log_contacts()
     count, plans = scene.config.frames, scene.config.reduce
     usual = min((count + 1) // 2, SNAPSHOTS)
-    numbers = {
+    frames = {
         group: training_frames(count, plans[group].train if group in plans else usual)
         for group in scene.config.groups
     }
-    frames = {group: own[own >= len(begun)] for group, own in numbers.items()}
     config = scene.config.model_dump(mode="json")
     reported = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
-    if start is not None:
-        reported["start"] = f"frame {len(begun)} of {start.title}"
     with made_by("pdrom.api.run", reported), ExitStack() as kept:
         # without ``out``, the run is written to a temporary folder that is deleted afterwards
         folder = "" if out else kept.enter_context(TemporaryDirectory(prefix="pdrom-"))
         path = Path(out or Path(folder, "run.h5"))
         with event.install_listener("numba:compile", _Compilation(scene.config.name)) as compiled:
-            run_full_order(scene, path, frames, True, on_frame, begun, method)
+            later = {group: own[own >= len(begun)] for group, own in frames.items()}
+            run_full_order(scene, path, later, True, on_frame, begun, method)
         if compiled.done:
             log.info("%s: kernels compiled in %.1f s", scene.config.name, compiled.duration)
         with open_hdf5(path) as file:
@@ -115,17 +113,18 @@ def _begun(
     """Return states and reports of the frames of ``start`` that are kept, and the new method."""
     if start is None:
         if frame is not None:
-            raise ConfigurationError("frame: only of a run that goes on (start)")
+            raise ConfigurationError("--frame: only with --from, the run that goes on (start)")
         return [], None
     own, h = files.require_run(start, "start").scene, scene.config.time_step
-    for key in ("points", "triangles", "tetrahedra"):
-        found, needed = getattr(own.mesh, key), getattr(scene.mesh, key)
-        if not np.array_equal(found, needed):
-            fault = f"other {key} ({len(found)}) than the scene ({len(needed)})"
-            raise ConfigurationError(f"start: {start.title} has {fault}: another mesh")
-    if own.config.time_step != h:
-        fault = f"has time_step = {own.config.time_step:g}, the scene {h:g}"
-        raise ConfigurationError(f"start: {start.title} {fault}; it goes on with the same one")
+    for key in ("points", "triangles", "tetrahedra", "time_step"):
+        had, needed = (
+            getattr(s.config if key == "time_step" else s.mesh, key) for s in (own, scene)
+        )
+        if not np.array_equal(had, needed):
+            sizes = " for ".join(str(np.shape(each) or each) for each in (had, needed))
+            raise ConfigurationError(
+                f"start: {start.title} has other {key} ({sizes}) than the scene"
+            )
     n, frames = len(start.ms) if frame is None else frame, scene.config.frames
     last = min(len(start.ms), frames - 1)
     if not isinstance(n, (int, np.integer)) or not 1 <= n <= last:
@@ -134,16 +133,13 @@ def _begun(
     q, anchors = start.positions[: n + 1].astype(float), Anchors()
     for k in range(n):
         *_, anchors = held_path(own.boundaries, range(k, k + 1), q[k], anchors)
-    # a hold is the same if at most its end differs
-    configs = (
-        [b.config.model_copy(update={"until": None}) for b in s.boundaries] for s in (own, scene)
-    )
-    had, has = configs
+    any_end, holds = {"until": None}, (own.boundaries, scene.boundaries)
+    had, has = ([b.config.model_copy(update=any_end) for b in each] for each in holds)
     anchors = tuple(anchors[had.index(hold)] if hold in had else None for hold in has)
-    seconds = np.outer(1e-3 * start.ms, np.eye(len(PHASES))[-1])  # in one phase
+    unknown, part = np.full(1, np.nan), 1e-3 / len(PHASES)  # the phases' times are not told apart
     begun = [
-        (State(after, (after - before) / h, anchors), FrameReport(np.full(1, np.nan), spent))
-        for before, after, spent in zip(q, q[1:], seconds, strict=False)
+        (State(after, (after - before) / h, anchors), FrameReport(unknown, np.full(4, part * ms)))
+        for before, after, ms in zip(q, q[1:], start.ms, strict=False)
     ]
     same = all(getattr(own.config, key) == getattr(scene.config, key) for key in ACTING)
     whole = same and start.method == FULL

@@ -150,9 +150,11 @@ def train(
     started = perf_counter()
     given, runs = locals(), [_full_order(one) for one in (full, *others)]
     asked = arguments(full.scene, given)
+    still = [standstill(one.scene, one.positions) for one in runs]
+    if all(still) and not asked.variations:
+        raise NotReducibleError(f"scene '{full.scene.config.name}': {still[0]}")
     drawn = _variations(full.scene, "validation", asked.validate_, VALIDATION)
     if method is not None or asked.group is not None:
-        _require_motion([full])
         reduced = projections_model(full, asked.group, method or METHOD, asked.r)
         done = Training((full.scene.config.name,), False, None, None, perf_counter() - started)
         tests = [_reference(scene, False, progress) for scene in drawn]
@@ -167,7 +169,6 @@ def train(
         references = [_reference(s, True, progress) for s in [*(one.scene for one in runs), *more]]
     else:
         references = [*runs, *(_reference(scene, False, progress) for scene in more)]
-    _require_motion(references)
     spent = perf_counter() - started
     tests = [_reference(scene, asked.converged, progress) for scene in drawn]
     tried: list[tuple[float, str]] = []
@@ -195,23 +196,10 @@ def _full_order(run: Any) -> Run:
     return run
 
 
-def _require_motion(runs: Sequence[Run]) -> None:
-    """Raise NotReducibleError unless something moves in one of ``runs``."""
-    still = [standstill(run.scene, run.positions) for run in runs]
-    if all(still):
-        name = runs[0].scene.config.name
-        raise NotReducibleError(f"scene '{name}': {still[0]}; there is nothing to reduce")
-
-
 def _trained(
-    references: Sequence[Run],
-    asked: Arguments,
-    modes: int,
-    hold: Sequence[np.ndarray],
-    own: np.ndarray | None,
-    selection: Choose | None,
-    before: float,
-) -> Model:
+    references: Sequence[Run], asked: Arguments, modes: int, hold: Sequence[np.ndarray],
+    own: np.ndarray | None, selection: Choose | None, before: float,
+) -> Model:  # fmt: skip
     """Model of this number of ``modes``, or with ``own`` columns (N, K), without validation.
 
     ``before`` are seconds that the training has taken already.

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 # Density of a new scene: of cotton, kg/m^2 of a surface, and of water, kg/m^3 of a volume.
 DENSITY = {2: 0.2, 3: 1000.0}
-# A hanging new scene is stretched by this part at its top, whatever its mesh. Weight of bending over
-# that of strain and squared extent.
+# A hanging body is stretched by this part at its top. Bending's weight over strain's and extent^2.
 STRETCH, BENDING = 0.02, 1e-6
 ENOUGH = 3  # smallest number of fixed vertices with which a body cannot turn about a line
 

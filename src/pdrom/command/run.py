@@ -24,8 +24,6 @@ def perform(arguments: argparse.Namespace) -> Status:
     file, scene = Path(arguments.scene), load_scene(arguments.scene)
     others = arguments.model, arguments.compare, arguments.start
     read = [*files_of(arguments.scene, scene), *filter(None, others)]
-    if arguments.frame is not None and not arguments.start:
-        raise ConfigurationError("--frame: only with --from, the run that goes on")
     if arguments.start and arguments.model:
         raise ConfigurationError("--from: only of runs in full order (without --model)")
     if arguments.compare and not arguments.model:
@@ -41,17 +39,15 @@ def perform(arguments: argparse.Namespace) -> Status:
         fault = f"{reference.title} is no run of this scene in full order"
         raise ConfigurationError(f"--compare {arguments.compare}: {fault}")
     progress = Progress(scene.config.name, scene.config.frames)
-    if model:
-        made = model.run(scene, out, progress)
-    else:
-        start = load(arguments.start, arguments.unchecked) if arguments.start else None
-        made = run(scene, out, progress, start, arguments.frame)
+    start = load(arguments.start, arguments.unchecked) if arguments.start else None
+    after = start, arguments.frame
+    made = model.run(scene, out, progress) if model else run(scene, out, progress, *after)
     sys.stdout.write(
         f"{out}: {len(made.ms)} frames of {scene.mesh.vertices} vertices ({seams(scene.mesh)}), "
         f"{np.median(made.ms):.2f} ms a frame (median)\n"
     )
     if still := standstill(scene, made.positions):
-        sys.stdout.write(f"{out}: {still}; there is nothing to reduce\n")
+        sys.stdout.write(f"{out}: {still}\n")
     if model and reference:
         sys.stdout.write(f"{_compared(model, made, reference)}\n")
     if made.blowup_frame is not None:

@@ -50,13 +50,9 @@ class ConvergedStepper(Stepper):
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        system: GlobalSystem,
-        tolerance: float,
-        limit: int,
+        self, scene: Scene, system: GlobalSystem, tolerance: float, limit: int,
         from_last: bool = False,
-    ) -> None:
+    ) -> None:  # fmt: skip
         super().__init__(scene.space(system), scene.config.time_step, limit, scene.groups)
         self.space: VertexSpace
         self._from_last = from_last
@@ -83,13 +79,8 @@ class ConvergedStepper(Stepper):
             elimination.solve(rhs, target)
             return energy + self.space.inertia_energy(y - s), target
 
-        end = minimise(
-            evaluate,
-            self.space.system.matrix,
-            first,
-            tolerance=self.tolerance,
-            limit=self.iterations,
-        )
+        matrix = self.space.system.matrix
+        end = minimise(evaluate, matrix, first, self.tolerance, self.iterations)
         self.converged &= end.change <= self.tolerance
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
