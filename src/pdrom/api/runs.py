@@ -142,8 +142,7 @@ def _begun(
         for before, after, ms in zip(q, q[1:], start.ms, strict=False)
     ]
     same = all(getattr(own.config, key) == getattr(scene.config, key) for key in ACTING)
-    whole = same and start.method == FULL
-    return begun, None if whole else f"continuing {start.title} from frame {n}"
+    return begun, None if same and start.method == FULL else f"continuing {start.title}, frame {n}"
 
 
 def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:

@@ -38,10 +38,9 @@ def perform(arguments: argparse.Namespace) -> Status:
     if reference and not (reference.full_order and reference.scene.config == scene.config):
         fault = f"{reference.title} is no run of this scene in full order"
         raise ConfigurationError(f"--compare {arguments.compare}: {fault}")
-    progress = Progress(scene.config.name, scene.config.frames)
+    tick = Progress(scene.config.name, scene.config.frames)
     start = load(arguments.start, arguments.unchecked) if arguments.start else None
-    after = start, arguments.frame
-    made = model.run(scene, out, progress) if model else run(scene, out, progress, *after)
+    made = model.run(scene, out, tick) if model else run(scene, out, tick, start, arguments.frame)
     sys.stdout.write(
         f"{out}: {len(made.ms)} frames of {scene.mesh.vertices} vertices ({seams(scene.mesh)}), "
         f"{np.median(made.ms):.2f} ms a frame (median)\n"

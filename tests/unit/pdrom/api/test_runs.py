@@ -51,7 +51,7 @@ def test_another_scene_goes_on_from_a_run_and_says_so(tmp_path):
     bottom = found.scene.boundaries[0].vertices
     assert np.array_equal(found.positions[:7], first.positions[:7])
     assert (found.positions[7:14, bottom] == first.positions[6, bottom]).all()
-    assert api.load(tmp_path / "a.h5").title.endswith(f"by continuing {first.title} from frame 6")
+    assert api.load(tmp_path / "a.h5").title.endswith(f"by continuing {first.title}, frame 6")
     with pytest.raises(ConfigurationError, match="a run in full order is required"):
         api.train(found)
 

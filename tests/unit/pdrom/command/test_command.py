@@ -68,6 +68,9 @@ def test_a_scene_is_run_a_model_trained_and_run_and_all_is_shown(folder, capsys)
     assert "against the run of 'small' by full order, 10 iterations" in second
     assert "measured now, in turn" in second
     assert run(["view", "small_small.h5", "small.h5"]) == Status.DONE
+    goes_on = ["run", "small.yaml", "--from", "small.h5", "--frame", "5", "--out", "later.h5"]
+    assert run(goes_on) == Status.DONE
+    assert np.array_equal(load("later.h5").positions, load("small.h5").positions)
     assert not list(folder.glob(".*"))  # no hidden file beside a user's own
     capsys.readouterr()
     assert run(["show", "small.model.h5"]) == Status.DONE
@@ -274,10 +277,8 @@ def test_a_new_sheet_sags_alike_if_it_is_refined():
     keys["effects"] += [{"effect": "damping", "rate": 10.0}, {"effect": "pins", "select": "top"}]
     keys["effects"] = [e for e in keys["effects"] if e.get("select") != "x_min"]
     for size in (10, 20):
-        config, mesh = (
-            SceneConfig.model_validate(keys | {"iterations": 2 * size}),
-            cloth(size, size),
-        )
+        config = SceneConfig.model_validate(keys | {"iterations": 2 * size})
+        mesh = cloth(size, size)
         q = trajectory(scene := Scene.build(config, mesh))
         sags.append(float(mesh.points[:, 1].min() - q[-1, :, 1].min()))
         assert np.abs(q[-1] - q[-2]).max() < 1e-6 < sags[-1]
