@@ -12,7 +12,7 @@ import numpy as np
 from numba.core import event
 
 from pdrom.api import files
-from pdrom.api.records import FULL, STILL, Run, stored_run
+from pdrom.api.records import FULL, STILL, Run, standstill, stored_run
 from pdrom.core import config_file
 from pdrom.core.errors import ConfigurationError, RankError, SnapshotError, choices
 from pdrom.core.provenance import made_by
@@ -192,8 +192,9 @@ def projections_model(
     snapshots do not change, or have fewer than r modes above round-off.
     """
     chosen, spec = group_of(full.scene, group), method_spec(method)
-    made = basis(full, chosen.name, spec)
-    p = full.snapshots[chosen.name].p
+    if still := standstill(full.scene, full.positions):
+        raise RankError(f"scene '{full.scene.config.name}': {still}")
+    made, p = basis(full, chosen.name, spec), full.snapshots[chosen.name].p
     if (changes := np.ptp(p, axis=0).max()) <= STILL * (largest := np.abs(p).max()):
         fault = f"its projections, of up to {largest:.2g}, change by at most {changes:.2g}"
         raise RankError(f"group '{chosen.name}': {fault}: there is nothing to reduce")

@@ -150,9 +150,6 @@ def train(
     started = perf_counter()
     given, runs = locals(), [_full_order(one) for one in (full, *others)]
     asked = arguments(full.scene, given)
-    still = [standstill(one.scene, one.positions) for one in runs]
-    if all(still) and not asked.variations:
-        raise NotReducibleError(f"scene '{full.scene.config.name}': {still[0]}")
     drawn = _variations(full.scene, "validation", asked.validate_, VALIDATION)
     if method is not None or asked.group is not None:
         reduced = projections_model(full, asked.group, method or METHOD, asked.r)
@@ -204,6 +201,8 @@ def _trained(
 
     ``before`` are seconds that the training has taken already.
     """
+    if all(still := [standstill(run.scene, run.positions) for run in references]):
+        raise NotReducibleError(f"scene '{references[0].scene.config.name}': {still[0]}")
     started, scenes = perf_counter(), [run.scene for run in references]
     frames = np.concatenate([run.positions[1 :: len(references)] for run in references])
     columns = make_columns(scenes, frames, modes, asked.skinning, own, hold)

@@ -178,7 +178,7 @@ EVERY = {"select": {"kind": "box", "lower": [-9] * 3, "upper": [9] * 3}}
 CARRIED = {"effect": "translate", "offset": [0, 1, 0], "over": 3, **EVERY}
 BENDING = {"effect": "bending", "weight": 0.1}
 NOTHING = {  # effects, frames, group, message
-    "at rest": ([], 8, None, "nothing moves: 30 free .* by at most .*e-1. m, below 1e-06 of"),
+    "at rest": ([], 8, None, "nothing moves: 30 free .* by at most .* m, below 1e-06 of"),
     "no gravity": ([GRAVITY | {"acceleration": [0] * 3}, LEFT], 8, None, "nothing moves: 25 free"),
     "all held": ([GRAVITY, {"effect": "pins", **EVERY}], 8, None, "nothing moves: 0 free"),
     "all carried": ([GRAVITY, CARRIED], 8, None, "nothing moves: 0 free"),
