@@ -157,8 +157,9 @@ class Run:
         return Errors(trajectory_error(distance, moved_by), shape, reference.title)
 
     def errors(self, reference: "Run") -> np.ndarray:
-        """Error (F',) of the positions in each frame, relative to the RMS displacement."""
-        return self.differences(reference) / mean_motion(reference.positions)
+        """Error (F',) of the positions, relative to the RMS displacement; NaN if nothing moves."""
+        still = standstill(reference.scene, reference.positions)
+        return self.differences(reference) / (np.nan if still else mean_motion(reference.positions))
 
     def differences(self, reference: "Run") -> np.ndarray:
         """Frobenius norm (F',) m of the difference from ``reference`` in each frame of this run."""
@@ -187,8 +188,9 @@ def standstill(scene: Scene, positions: np.ndarray) -> str:
     Vertices that are held in every frame do not count: nobody computes their positions.
     """
     held = (held_vertices(scene.boundaries, frame) for frame in range(len(positions) - 1))
-    free = np.setdiff1d(np.arange(scene.mesh.vertices), reduce(np.intersect1d, held))
-    moved = float(np.abs(positions[:, free] - positions[0, free]).max(initial=0.0))
+    every = np.arange(scene.mesh.vertices)
+    free = np.setdiff1d(every, reduce(np.intersect1d, held, every))
+    moved = float(np.ptp(positions, axis=0)[free].max(initial=0.0))
     if moved > STILL * scene.mesh.extent:
         return ""
     size = f"{len(free)} free vertices move by at most {moved:.2g} m, below {STILL:g} of the extent"

@@ -45,7 +45,7 @@ def perform(arguments: argparse.Namespace) -> Status:
         f"{out}: {len(made.ms)} frames of {scene.mesh.vertices} vertices ({seams(scene.mesh)}), "
         f"{np.median(made.ms):.2f} ms a frame (median)\n"
     )
-    if still := standstill(scene, made.positions):
+    if made.blowup_frame is None and (still := standstill(scene, made.positions)):
         sys.stdout.write(f"{out}: {still}\n")
     if model and reference:
         sys.stdout.write(f"{_compared(model, made, reference)}\n")

@@ -166,8 +166,7 @@ def run(
             if (frame + 1) % max(1, frames // 10) == 0:
                 log.info("%s: frame %d of %d", scene.config.name, frame + 1, frames)
         file.attrs["factorisations"] = scene.system.factorisations
-        if method is not None:
-            file.attrs["method"] = method
+        file.attrs.update({"method": method} if method else {})
 
 
 class _SnapshotRecorder:

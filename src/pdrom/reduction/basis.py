@@ -55,11 +55,10 @@ class Basis:
     def truncated(self, r: int) -> np.ndarray:
         """Return the first r modes (3 e p, r); RankError if the basis has fewer modes."""
         if not 1 <= r <= self.rank:
-            allowed = f"allowed are 1 to {self.rank}"
-            none = "only round-off changes, there is nothing to reduce"
+            allowed = f"allowed are 1 to {self.rank}" if self.rank else "there is nothing to reduce"
             raise RankError(
                 f"{self.origin}: r = {r}, the snapshots have numerical rank {self.rank} "
-                f"(round-off {self.roundoff:.1e}): {allowed if self.rank else none}"
+                f"(round-off {self.roundoff:.1e}): {allowed}"
             )
         return self.V[:, :r]
 

@@ -46,9 +46,11 @@ def test_a_run_that_goes_on_is_the_uninterrupted_one_bit_for_bit(group, tmp_path
 
 def test_another_scene_goes_on_from_a_run_and_says_so(tmp_path):
     """A hold that the first run has not begins where its vertices are then."""
-    first = api.run(scene(GRAVITY, VELOCITY, SPRING))
-    found = api.run(scene(SPRING, ENDING), tmp_path / "a.h5", start=first, frame=6)
-    bottom = found.scene.boundaries[0].vertices
+    first, own = api.run(scene(GRAVITY, VELOCITY, SPRING)), scene(SPRING, ENDING)
+    found, bottom = (
+        api.run(own, tmp_path / "a.h5", start=first, frame=6),
+        own.boundaries[0].vertices,
+    )
     assert np.array_equal(found.positions[:7], first.positions[:7])
     assert (found.positions[7:14, bottom] == first.positions[6, bottom]).all()
     assert api.load(tmp_path / "a.h5").title.endswith(f"by continuing {first.title}, frame 6")
