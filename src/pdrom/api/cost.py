@@ -13,6 +13,7 @@ import pandas as pd
 
 from pdrom.api import files
 from pdrom.api.model import Model, load_model, silent, timed
+from pdrom.api.records import standstill
 from pdrom.api.training import EVALUATIONS, Progress, tolerance_of
 from pdrom.core.errors import ConfigurationError, NotReducibleError, PdromError, SolverError
 from pdrom.core.yamlfile import shown
@@ -65,7 +66,7 @@ def cost(
     Raises
     ------
     ConfigurationError, SceneError, MeshError, StorageError, SolverError
-        A wrong argument or file; no coarser mesh; a model of another mesh; no convergence.
+        A wrong argument or file; no coarser mesh; a model of another mesh; no convergence, motion.
     """
     files.require_runnable(scene, None, progress, "progress")
     for given, what in ((coarser, "coarser"), (models, "models")):
@@ -85,6 +86,8 @@ def cost(
             f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations, so that "
             "nothing tells errors; a smaller time_step or smaller weights converge sooner"
         )
+    if still := standstill(scene, reference):
+        raise NotReducibleError(f"scene '{name}': {still}")
     truth, rows = Yardstick(scene, reference), []
     for number, setting in enumerate(tried, start=1):
         log.info("%s: setting %d of %d, %s", name, number, len(tried), setting.labels["setting"])
@@ -96,9 +99,8 @@ def cost(
     log.info("%s: timing all settings in turn, over %d frames", name, few)
     times, busy = timed([tried[i].variant({}, few) for i in order], REPEATS)
     table.loc[order, "ms"] = times
-    error = table.position_error.fillna(0.0)  # nothing moves: every setting is exact
-    best = settings.pareto(error.tolist(), table.ms.tolist())
-    table["best"] = np.array(best) & np.isfinite(error)
+    best = settings.pareto(table.position_error.tolist(), table.ms.tolist())
+    table["best"] = np.array(best) & np.isfinite(table.position_error)
     log.info("%s: estimating the error of the mesh by coarser ones", name)
     ends = meshes[:: max(1, len(meshes) - 1)]
     runs = [mesh.converged(tolerance_of(mesh.scene), EVALUATIONS) for mesh in ends[1:] and ends]

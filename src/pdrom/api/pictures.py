@@ -48,7 +48,7 @@ def plot(reference: Run, *runs: Run) -> Figure:
         ax = figure.subplots()
         errors = [np.clip(run.errors(reference), LOW, HIGH) for run in runs]
         whole = np.log10(np.concatenate([*errors, [1e-3, 1.0]]))
-        style.log_axis(ax, 10.0 ** np.floor(whole.min()), 10.0 ** np.ceil(whole.max()))
+        style.log_axis(ax, 10.0 ** np.floor(np.nanmin(whole)), 10.0 ** np.ceil(np.nanmax(whole)))
         for i, (run, error) in enumerate(zip(runs, errors, strict=True)):
             time = run.scene.config.time_step * np.arange(1, len(error) + 1)
             colour = style.CYCLE[i % len(style.CYCLE)]

@@ -1,7 +1,7 @@
 """The run of a scene, in full order or with a model, its errors, and its arrays in a file."""
 
 from dataclasses import dataclass, field, is_dataclass
-from functools import cache
+from functools import cache, reduce
 from typing import Annotated, Any, cast, get_type_hints
 
 import h5py
@@ -12,6 +12,7 @@ from pdrom.core.errors import ConfigurationError, SnapshotError
 from pdrom.core.packed import brief
 from pdrom.core.store import require_finite
 from pdrom.core.yamlfile import shown, validate
+from pdrom.model.effects.base import held_vertices
 from pdrom.model.mesh.types import store_mesh
 from pdrom.model.metrics import deformation_error, trajectory_error
 from pdrom.model.scene import Scene
@@ -51,7 +52,7 @@ class Snapshots:
 
 
 FULL = "full order"
-STILL = 1e-9  # a body that moves by less than this fraction of its coordinates' range stands still
+STILL = 1e-6  # a body stands still if no coordinate changes by more than this part of its extent
 
 
 @dataclass(frozen=True)
@@ -147,17 +148,18 @@ class Run:
         self.require_comparable(reference)
         if self.blowup_frame is not None or reference.blowup_frame is not None:
             return Errors(None, None, reference.title)
+        if still := standstill(reference.scene, reference.positions):
+            return Errors(None, None, f"{reference.title}; {still}")
         moved, other = self.positions[1:], reference.positions[1:]
         rest, masses = self.scene.mesh.points, reference.scene.masses
         distance, moved_by = self.differences(reference), displacement_norms(reference.positions)
-        shape, still = deformation_error(moved, other, rest, masses), np.abs(np.ptp(rest)) * STILL
-        moves = moved_by.max(initial=0.0) > still * np.sqrt(len(rest))
-        position = trajectory_error(distance, moved_by) if moves else None
-        return Errors(position, shape, reference.title)
+        shape = deformation_error(moved, other, rest, masses)
+        return Errors(trajectory_error(distance, moved_by), shape, reference.title)
 
     def errors(self, reference: "Run") -> np.ndarray:
-        """Error (F',) of the positions in each frame, relative to the RMS displacement."""
-        return self.differences(reference) / mean_motion(reference.positions)
+        """Error (F',) of the positions, relative to the RMS displacement; NaN if nothing moves."""
+        still = standstill(reference.scene, reference.positions)
+        return self.differences(reference) / (np.nan if still else mean_motion(reference.positions))
 
     def differences(self, reference: "Run") -> np.ndarray:
         """Frobenius norm (F',) m of the difference from ``reference`` in each frame of this run."""
@@ -178,6 +180,21 @@ class Run:
             if not same:
                 fault = f"another {name} than {reference.title}: errors compare runs frame by frame"
                 raise ConfigurationError(f"{self.title}: {fault}")
+
+
+def standstill(scene: Scene, positions: np.ndarray) -> str:
+    """Say how little the ``positions`` (F + 1, N, 3) m of a run of ``scene`` change; "" if they do.
+
+    Vertices that are held in every frame do not count: nobody computes their positions.
+    """
+    held = (held_vertices(scene.boundaries, frame) for frame in range(len(positions) - 1))
+    every = np.arange(scene.mesh.vertices)
+    free = np.setdiff1d(every, reduce(np.intersect1d, held, every))
+    moved = float(np.ptp(positions, axis=0)[free].max(initial=0.0))
+    if moved > STILL * scene.mesh.extent:
+        return ""
+    size = f"{len(free)} free vertices move by at most {moved:.2g} m, below {STILL:g} of the extent"
+    return f"nothing moves: {size}; there is nothing to reduce"
 
 
 _SNAPSHOTS = ("p", "roundoff", "frames")

@@ -4,6 +4,7 @@ import logging
 import os
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,15 +12,16 @@ import numpy as np
 from numba.core import event
 
 from pdrom.api import files
-from pdrom.api.records import Run, stored_run
+from pdrom.api.records import FULL, STILL, Run, standstill, stored_run
 from pdrom.core import config_file
-from pdrom.core.errors import ConfigurationError, SnapshotError, choices
+from pdrom.core.errors import ConfigurationError, RankError, SnapshotError, choices
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5
 from pdrom.core.yamlfile import shown, validate
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.stepper import FrameReport
+from pdrom.model.dynamics.stepper import PHASES, FrameReport, State
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
+from pdrom.model.effects.base import Anchors, held_path
 from pdrom.model.runs import run as run_full_order
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, group_basis
@@ -29,6 +31,7 @@ from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.snapshots import training_frames
 
 log = logging.getLogger(__name__)
+ACTING = ("iterations", "anderson_window", "vertex_mass", "masses", "effects")  # keys of a scene
 SNAPSHOTS = 100  # largest number of training snapshots of a group if the scene sets none
 
 
@@ -50,6 +53,8 @@ def run(
     scene: Scene,
     out: str | os.PathLike[str] | None = None,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
+    start: Run | None = None,
+    frame: int | None = None,
 ) -> Run:
     """Run a scene in full order; snapshots of every group are stored for the training of a basis.
 
@@ -61,18 +66,24 @@ def run(
     scene : scene made by `build_scene` or `load_scene`
     out : file (HDF5) to write; None writes no file
     on_frame : called after each frame with its number, from 0, and the solver's report
+    start : run on the same mesh, with the same time step, that goes on in ``scene``
+    frame : number of frames of ``start`` that are kept (None: all). Frame numbers, also those of
+        holds, count on; a hold that ``start`` has not begins there
 
     Returns
     -------
     Run
-        Positions and milliseconds of every frame, snapshots of every group.
+        Positions and milliseconds of every frame, snapshots of every group, not of kept frames.
+        If ``start`` ran with other settings, ``method`` says so.
 
     Raises
     ------
     ConfigurationError, StorageError
-        ``scene`` is no scene; ``out`` cannot be written, which is checked before the run.
+        ``scene`` is no scene; ``start`` does not suit it or has no such frame; ``out`` cannot be
+        written, which is checked before the run.
     """
     files.require_runnable(scene, out, on_frame)
+    begun, method = _begun(scene, start, frame)
     scene.log_holds()
     scene.log_contacts()
     count, plans = scene.config.frames, scene.config.reduce
@@ -88,11 +99,50 @@ def run(
         folder = "" if out else kept.enter_context(TemporaryDirectory(prefix="pdrom-"))
         path = Path(out or Path(folder, "run.h5"))
         with event.install_listener("numba:compile", _Compilation(scene.config.name)) as compiled:
-            run_full_order(scene, path, frames, with_mesh=True, on_frame=on_frame)
+            later = {group: own[own >= len(begun)] for group, own in frames.items()}
+            run_full_order(scene, path, later, True, on_frame, begun, method)
         if compiled.done:
             log.info("%s: kernels compiled in %.1f s", scene.config.name, compiled.duration)
         with open_hdf5(path) as file:
             return stored_run(scene, file)
+
+
+def _begun(
+    scene: Scene, start: Run | None, frame: int | None
+) -> tuple[list[tuple[State, FrameReport]], str | None]:
+    """Return states and reports of the frames of ``start`` that are kept, and the new method."""
+    if start is None:
+        if frame is not None:
+            raise ConfigurationError("--frame: only with --from, the run that goes on (start)")
+        return [], None
+    own, h = files.require_run(start, "start").scene, scene.config.time_step
+    for key in ("points", "triangles", "tetrahedra", "time_step"):
+        had, needed = (
+            getattr(s.config if key == "time_step" else s.mesh, key) for s in (own, scene)
+        )
+        if not np.array_equal(had, needed):
+            sizes = " for ".join(str(np.shape(each) or each) for each in (had, needed))
+            raise ConfigurationError(
+                f"start: {start.title} has other {key} ({sizes}) than the scene"
+            )
+    n, frames = len(start.ms) if frame is None else frame, scene.config.frames
+    last = min(len(start.ms), frames - 1)
+    if not isinstance(n, (int, np.integer)) or not 1 <= n <= last:
+        ends = f"the run has {len(start.ms)} frames, and the scene ends after frames = {frames}"
+        raise ConfigurationError(f"frame = {shown(n, 60)}: allowed are 1 to {last}, as {ends}")
+    q, anchors = start.positions[: n + 1].astype(float), Anchors()
+    for k in range(n):
+        *_, anchors = held_path(own.boundaries, range(k, k + 1), q[k], anchors)
+    any_end, holds = {"until": None}, (own.boundaries, scene.boundaries)
+    had, has = ([b.config.model_copy(update=any_end) for b in each] for each in holds)
+    anchors = tuple(anchors[had.index(hold)] if hold in had else None for hold in has)
+    unknown, part = np.full(1, np.nan), 1e-3 / len(PHASES)  # the phases' times are not told apart
+    begun = [
+        (State(after, (after - before) / h, anchors), FrameReport(unknown, np.full(4, part * ms)))
+        for before, after, ms in zip(q, q[1:], start.ms, strict=False)
+    ]
+    same = all(getattr(own.config, key) == getattr(scene.config, key) for key in ACTING)
+    return begun, None if same and start.method == FULL else f"continuing {start.title}, frame {n}"
 
 
 def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:
@@ -124,7 +174,8 @@ def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:
         raise SnapshotError(f"group '{group}': the run stored no snapshots of it")
     data = full.snapshots[group]
     roundoff = float(np.linalg.norm(data.roundoff))
-    return group_basis(chosen, full.scene.masses, data.p, roundoff, spec)
+    made = group_basis(chosen, full.scene.masses, data.p, roundoff, spec)
+    return replace(made, origin=f"group '{group}'")
 
 
 def methods() -> dict[str, MethodSpec]:
@@ -138,10 +189,15 @@ def projections_model(
     """Model in which the projections of ``group`` are reduced to r modes by ``method``.
 
     ``group`` None is the scene's only group. Raises the errors of `basis`, and RankError if the
-    snapshots have fewer than r modes above round-off.
+    snapshots do not change, or have fewer than r modes above round-off.
     """
     chosen, spec = group_of(full.scene, group), method_spec(method)
-    made = basis(full, chosen.name, spec)
+    if still := standstill(full.scene, full.positions):
+        raise RankError(f"scene '{full.scene.config.name}': {still}")
+    made, p = basis(full, chosen.name, spec), full.snapshots[chosen.name].p
+    if (changes := np.ptp(p, axis=0).max()) <= STILL * (largest := np.abs(p).max()):
+        fault = f"its projections, of up to {largest:.2g}, change by at most {changes:.2g}"
+        raise RankError(f"group '{chosen.name}': {fault}: there is nothing to reduce")
     return ProjectionModel(chosen.name, Reduction(made, select(made, spec, r), spec, r=r))
 
 

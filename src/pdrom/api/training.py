@@ -12,7 +12,7 @@ from pydantic import Field
 
 from pdrom.api import files
 from pdrom.api.model import Model, OnFrame, Training, require_same_mesh, silent, worst_errors
-from pdrom.api.records import FULL, Run
+from pdrom.api.records import FULL, Run, standstill
 from pdrom.api.runs import group_of, method_spec, projections_model, run
 from pdrom.core.errors import ConfigurationError, NotReducibleError, SnapshotError
 from pdrom.core.store import require_finite
@@ -144,8 +144,8 @@ def train(
     ConfigurationError, SceneError, SnapshotError, RankError
         A wrong argument; runs of different meshes; too few modes or snapshots.
     NotReducibleError
-        No tried model is within ``error``, a training scene does not converge, or it has an effect
-        that no position subspace can simulate.
+        No tried model is within ``error``, a training scene does not converge or has an effect that
+        no position subspace can simulate, or nothing moves.
     """
     started = perf_counter()
     given, runs = locals(), [_full_order(one) for one in (full, *others)]
@@ -194,18 +194,15 @@ def _full_order(run: Any) -> Run:
 
 
 def _trained(
-    references: Sequence[Run],
-    asked: Arguments,
-    modes: int,
-    hold: Sequence[np.ndarray],
-    own: np.ndarray | None,
-    selection: Choose | None,
-    before: float,
-) -> Model:
+    references: Sequence[Run], asked: Arguments, modes: int, hold: Sequence[np.ndarray],
+    own: np.ndarray | None, selection: Choose | None, before: float,
+) -> Model:  # fmt: skip
     """Model of this number of ``modes``, or with ``own`` columns (N, K), without validation.
 
     ``before`` are seconds that the training has taken already.
     """
+    if all(still := [standstill(run.scene, run.positions) for run in references]):
+        raise NotReducibleError(f"scene '{references[0].scene.config.name}': {still[0]}")
     started, scenes = perf_counter(), [run.scene for run in references]
     frames = np.concatenate([run.positions[1 :: len(references)] for run in references])
     columns = make_columns(scenes, frames, modes, asked.skinning, own, hold)

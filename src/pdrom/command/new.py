@@ -19,9 +19,8 @@ if TYPE_CHECKING:
 
 # Density of a new scene: of cotton, kg/m^2 of a surface, and of water, kg/m^3 of a volume.
 DENSITY = {2: 0.2, 3: 1000.0}
-# Weight of a new scene's constraints over density and squared distance of vertices, 1/s^2: iterated
-# ten times in a time step of 16 ms, they converge. Of bending it is smaller by this factor.
-STIFFNESS, BENDING = 1e4, 1e-3
+# A hanging body is stretched by this part at its top. Bending's weight over strain's and extent^2.
+STRETCH, BENDING = 0.02, 1e-6
 ENOUGH = 3  # smallest number of fixed vertices with which a body cannot turn about a line
 
 
@@ -76,8 +75,7 @@ def template(
     text = config_file("new_scene.txt").read_text("utf-8").partition("\n")[2]
     text = re.sub(rf"(?m)^(?!{dimension})[23]\|.*\n|^{dimension}\|", "", text)
     density, total = DENSITY[dimension], float(vertex_measures(mesh).sum())
-    square = (total / mesh.vertices) ** (2.0 / dimension)  # of a distance of vertices
-    weight = STIFFNESS * density * square
+    weight = 9.81 * density * side / STRETCH
     held, moved, corner = _held(mesh, axis)
     below = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
     below[axis] = mesh.points[:, axis].min() - 0.25 * side
@@ -87,7 +85,7 @@ def template(
         **names, mesh=made, about=_about(mesh), density=density, total=_plain(density * total),
         up=up, pull=pull, floor=_floor(mesh, axis), held=held, moved=moved, corner=corner,
         offset=_along(axis, _short(0.3 * side)), below=centre, weight=_short(weight),
-        bending=_short(BENDING * weight * square), tenth=_short(0.1 * side),
+        bending=_short(BENDING * weight * side**2), tenth=_short(0.1 * side),
         fifth=_short(0.2 * side), half=_short(0.5 * side), twice=_short(2.0 * side),
     )  # fmt: skip
 

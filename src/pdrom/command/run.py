@@ -16,12 +16,16 @@ def perform(arguments: argparse.Namespace) -> Status:
     import numpy as np
 
     from pdrom.api import load, load_model, load_scene, run
+    from pdrom.api.records import standstill
     from pdrom.command.progress import Progress
     from pdrom.core.errors import ConfigurationError
     from pdrom.model.mesh.checks import seams
 
     file, scene = Path(arguments.scene), load_scene(arguments.scene)
-    read = [*files_of(arguments.scene, scene), *filter(None, (arguments.model, arguments.compare))]
+    others = arguments.model, arguments.compare, arguments.start
+    read = [*files_of(arguments.scene, scene), *filter(None, others)]
+    if arguments.start and arguments.model:
+        raise ConfigurationError("--from: only of runs in full order (without --model)")
     if arguments.compare and not arguments.model:
         raise ConfigurationError("--compare: only of runs with a model (--model)")
     name = file.stem
@@ -34,12 +38,15 @@ def perform(arguments: argparse.Namespace) -> Status:
     if reference and not (reference.full_order and reference.scene.config == scene.config):
         fault = f"{reference.title} is no run of this scene in full order"
         raise ConfigurationError(f"--compare {arguments.compare}: {fault}")
-    progress = Progress(scene.config.name, scene.config.frames)
-    made = model.run(scene, out, progress) if model else run(scene, out, progress)
+    tick = Progress(scene.config.name, scene.config.frames)
+    start = load(arguments.start, arguments.unchecked) if arguments.start else None
+    made = model.run(scene, out, tick) if model else run(scene, out, tick, start, arguments.frame)
     sys.stdout.write(
         f"{out}: {len(made.ms)} frames of {scene.mesh.vertices} vertices ({seams(scene.mesh)}), "
         f"{np.median(made.ms):.2f} ms a frame (median)\n"
     )
+    if made.blowup_frame is None and (still := standstill(scene, made.positions)):
+        sys.stdout.write(f"{out}: {still}\n")
     if model and reference:
         sys.stdout.write(f"{_compared(model, made, reference)}\n")
     if made.blowup_frame is not None:
@@ -68,6 +75,8 @@ COMMAND = Command(
             "metavar": "RUN.h5",
             "help": "full-order run of the scene, to which the model's run is compared",
         },
+        "--from": {"dest": "start", "metavar": "RUN.h5", "help": "run that goes on in this scene"},
+        "--frame": {"type": int, "metavar": "N", "help": "after so many of its frames (all)"},
         "--out": {
             "metavar": "FILE",
             "help": "file to write (HDF5); SCENE.h5 beside the scene without it, SCENE_MODEL.h5 "

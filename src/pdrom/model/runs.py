@@ -2,7 +2,7 @@
 
 import logging
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from time import perf_counter
@@ -50,13 +50,9 @@ class ConvergedStepper(Stepper):
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        system: GlobalSystem,
-        tolerance: float,
-        limit: int,
+        self, scene: Scene, system: GlobalSystem, tolerance: float, limit: int,
         from_last: bool = False,
-    ) -> None:
+    ) -> None:  # fmt: skip
         super().__init__(scene.space(system), scene.config.time_step, limit, scene.groups)
         self.space: VertexSpace
         self._from_last = from_last
@@ -83,13 +79,8 @@ class ConvergedStepper(Stepper):
             elimination.solve(rhs, target)
             return energy + self.space.inertia_energy(y - s), target
 
-        end = minimise(
-            evaluate,
-            self.space.system.matrix,
-            first,
-            tolerance=self.tolerance,
-            limit=self.iterations,
-        )
+        matrix = self.space.system.matrix
+        end = minimise(evaluate, matrix, first, self.tolerance, self.iterations)
         self.converged &= end.change <= self.tolerance
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)
@@ -128,6 +119,8 @@ def run(
     snapshot_frames: Mapping[str, np.ndarray],
     with_mesh: bool = False,
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
+    begun: Sequence[tuple[State, FrameReport]] = (),
+    method: str | None = None,
 ) -> None:
     """Run a scene; write positions, velocities, objective, timings and the requested snapshots.
 
@@ -138,6 +131,8 @@ def run(
     with_mesh : whether the mesh is written, too, so that the file can be used without the scene
     on_frame : called after each frame with its number and report
     path : HDF5 file that is written
+    begun : states and reports after the first frames, which are not computed then
+    method : description of a run that does not begin at the initial state of ``scene``
     """
     frames = scene.config.frames
     loop, state = scene.stepper(), scene.initial_state()
@@ -159,8 +154,10 @@ def run(
         recorder = _SnapshotRecorder(file, loop, snapshot_frames)
         series["positions"][0], series["velocities"][0] = state.positions, state.velocities
         for frame in range(frames):
-            watch = recorder.observer(frame)
-            state, report = loop.step(state, frame, watch)
+            if frame < len(begun):
+                state, report = begun[frame]
+            else:
+                state, report = loop.step(state, frame, recorder.observer(frame))
             series["positions"][frame + 1] = state.positions
             series["velocities"][frame + 1] = state.velocities
             series["objective"][frame] = report.objective
@@ -169,6 +166,7 @@ def run(
             if (frame + 1) % max(1, frames // 10) == 0:
                 log.info("%s: frame %d of %d", scene.config.name, frame + 1, frames)
         file.attrs["factorisations"] = scene.system.factorisations
+        file.attrs.update({"method": method} if method else {})
 
 
 class _SnapshotRecorder:

@@ -55,9 +55,10 @@ class Basis:
     def truncated(self, r: int) -> np.ndarray:
         """Return the first r modes (3 e p, r); RankError if the basis has fewer modes."""
         if not 1 <= r <= self.rank:
+            allowed = f"allowed are 1 to {self.rank}" if self.rank else "there is nothing to reduce"
             raise RankError(
                 f"{self.origin}: r = {r}, the snapshots have numerical rank {self.rank} "
-                f"(round-off {self.roundoff:.1e}), allowed are 1 to {self.rank}"
+                f"(round-off {self.roundoff:.1e}): {allowed}"
             )
         return self.V[:, :r]
 
@@ -99,13 +100,9 @@ def stored_basis(file: h5py.Group, origin: str) -> Basis:
 
 
 def compute_basis(
-    snapshots: np.ndarray,
-    row_mass: np.ndarray,
-    roundoff: float,
-    rows_per_element: int,
-    spec: BasisSpec,
-    signs: np.random.Generator | None = None,
-) -> Basis:
+    snapshots: np.ndarray, row_mass: np.ndarray, roundoff: float, rows_per_element: int,
+    spec: BasisSpec, signs: np.random.Generator | None = None,
+) -> Basis:  # fmt: skip
     """Compute the POD basis of training snapshots.
 
     Raises SnapshotError for fewer than two snapshots, a wrong shape, NaN or Inf, or mass weighting
@@ -166,23 +163,14 @@ def compute_basis(
         # on one axis, no more modes can be orthonormal than the axis has rows
         v = _mean_in_modes(v[:, : len(row_mass)], centred, mean * scale, active, signs)
         mean = np.zeros_like(mean)
-    return Basis(
-        V=np.ascontiguousarray(v / scale[:, None]),
-        mean=mean,
-        singular_values=sigma,
-        rank=v.shape[1],
-        roundoff=noise,
-        rows_per_element=rows_per_element,
-        active_axes=active,
-    )
+    modes, p = np.ascontiguousarray(v / scale[:, None]), rows_per_element
+    return Basis(modes, mean, sigma, v.shape[1], noise, p, active)
 
 
 def basis_of(
-    data: SnapshotSet,
-    spec: BasisSpec,
-    train: np.ndarray | None = None,
+    data: SnapshotSet, spec: BasisSpec, train: np.ndarray | None = None,
     signs: np.random.Generator | None = None,
-) -> Basis:
+) -> Basis:  # fmt: skip
     """Compute the POD basis of the training snapshots of ``data``, by the recipe ``spec``.
 
     Snapshots ``train`` (n, e p, 3) replace them if given; ``signs`` draws random signs of modes.
@@ -205,13 +193,12 @@ def _check(
     snapshots: np.ndarray, row_mass: np.ndarray, rows_per_element: int, spec: BasisSpec
 ) -> None:
     if snapshots.ndim != 3 or snapshots.shape[2] != 3 or len(snapshots) < 2:
-        raise SnapshotError(f"snapshots of shape {snapshots.shape}, required: (n >= 2, e p, 3)")
+        required = "(n >= 2, e p, 3); a run of one or two frames has one snapshot"
+        raise SnapshotError(f"snapshots of shape {snapshots.shape}, required: {required}")
     rows = snapshots.shape[1]
     if rows == 0 or rows % rows_per_element:
-        raise SnapshotError(
-            f"snapshots of {rows} rows, required: a multiple of rows_per_element "
-            f"= {rows_per_element}"
-        )
+        required = f"a multiple of rows_per_element = {rows_per_element}"
+        raise SnapshotError(f"snapshots of {rows} rows, required: {required}")
     if row_mass.shape != (rows,):
         raise SnapshotError(f"row_mass of shape {row_mass.shape}, required: ({rows},)")
     require_finite("snapshots", snapshots, SnapshotError)
@@ -241,12 +228,9 @@ def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray
 
 
 def _mean_in_modes(
-    v: np.ndarray,
-    centred: np.ndarray,
-    first: np.ndarray,
-    active: tuple[bool, ...],
+    v: np.ndarray, centred: np.ndarray, first: np.ndarray, active: tuple[bool, ...],
     signs: np.random.Generator | None,
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     """Scale modes ``v``, add the snapshot ``first`` to each, and orthonormalise per axis by QR.
 
     The scale is the standard deviation of all entries of ``centred``. An axis with fewer

@@ -15,6 +15,7 @@ EFFECTS = Registry(
         "box": "pdrom.model.effects.obstacle:Box",
         "self_collision": "pdrom.model.effects.self_collision:SelfCollision",
         "kick": "pdrom.model.effects.kick:Kick",
+        "velocity": "pdrom.model.effects.kick:Velocity",
         "pins": "pdrom.model.effects.hold:Pins",
         "translate": "pdrom.model.effects.hold:Translate",
         "rotate": "pdrom.model.effects.hold:Rotate",

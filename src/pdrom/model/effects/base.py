@@ -7,7 +7,7 @@ loop uses of it:
 =============  ===================================================  =========================
 role           result that the step loop uses                       examples
 =============  ===================================================  =========================
-`Start`        initial velocity                                     kick
+`Start`        initial velocity                                     kick, velocity
 `Force`        acceleration of the frame                            gravity, wind
 `Boundary`     held (prescribed) vertices and their positions       pins, translate, poke
 `Contact`      correction of the end-of-frame positions             floor, sphere
@@ -104,7 +104,7 @@ class Start(Effect):
 
     @abstractmethod
     def velocity(self) -> np.ndarray:
-        """Return the velocity (N, 3) m/s that is added to the initial velocity."""
+        """Return the velocity (N, 3) or (3,) m/s that is added to the initial velocity."""
 
 
 class Force(Effect):

@@ -1,12 +1,25 @@
-"""A smooth random initial velocity, used for held-out test motions."""
+"""Initial velocities: a uniform one, and a smooth random one for held-out test motions."""
 
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from pdrom.model.effects.base import EffectConfig, Seed, Start
+from pdrom.model.effects.base import EffectConfig, Seed, Start, Vector
 from pdrom.model.mesh.types import Mesh
+
+
+class Velocity(Start):
+    """The same initial velocity of all vertices; held ones follow their targets instead."""
+
+    class Config(EffectConfig):
+        """Velocity ``value`` in m/s."""
+
+        effect: Literal["velocity"] = "velocity"
+        value: Vector
+
+    def velocity(self) -> np.ndarray:
+        return np.array(self.config.value)
 
 
 class Kick(Start):

@@ -154,13 +154,13 @@ def test_arguments_that_another_one_makes_meaningless_are_refused(full, model):
         api.reduce(full)
 
 
-def test_speeds_are_of_all_frames_and_a_file_holds_a_model_of_a_body_at_rest(tmp_path):
-    still = api.build_scene(effects=[SPRING], mesh=MESH, frames=4)
-    model = api.train(api.run(still), modes=4)
+def test_speeds_are_of_all_frames_and_a_file_holds_a_model_of_a_rigid_body(tmp_path):
+    rigid = api.build_scene(effects=[GRAVITY, SPRING], mesh=MESH, frames=4)
+    model = api.train(api.run(rigid), modes=4)
     assert model.training.residual == 0.0  # there are no equations to fit
-    assert model.validation[["position_error", "deformation_error"]].isna().all(axis=None)
-    model.save(tmp_path / "still.h5")
-    assert api.load_model(tmp_path / "still.h5").validation.equals(model.validation)
+    assert model.validation.deformation_error.isna().all()
+    model.save(tmp_path / "rigid.h5")
+    assert api.load_model(tmp_path / "rigid.h5").validation.equals(model.validation)
     made = []
 
     def measure(variants, warmup, repeats):
@@ -170,8 +170,34 @@ def test_speeds_are_of_all_frames_and_a_file_holds_a_model_of_a_body_at_rest(tmp
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("pdrom.api.model.measure", measure)
         patch.setattr("pdrom.api.model.process_time", lambda: 0.0)
-        assert model.speed(still) == {"ms": 2.0, "full_ms": 5.0, "speedup": 2.5, "busy": True}
+        assert model.speed(rigid) == {"ms": 2.0, "full_ms": 5.0, "speedup": 2.5, "busy": True}
     assert made == [(4, 1, 1, 3)] * 2
+
+
+EVERY = {"select": {"kind": "box", "lower": [-9] * 3, "upper": [9] * 3}}
+CARRIED = {"effect": "translate", "offset": [0, 1, 0], "over": 3, **EVERY}
+BENDING = {"effect": "bending", "weight": 0.1}
+NOTHING = {  # effects, frames, group, message
+    "at rest": ([], 8, None, "nothing moves: 30 free .* by at most .* m, below 1e-06 of"),
+    "no gravity": ([GRAVITY | {"acceleration": [0] * 3}, LEFT], 8, None, "nothing moves: 25 free"),
+    "all held": ([GRAVITY, {"effect": "pins", **EVERY}], 8, None, "nothing moves: 0 free"),
+    "all carried": ([GRAVITY, CARRIED], 8, None, "nothing moves: 0 free"),
+    "flat": ([GRAVITY, LEFT, BENDING], 8, "bending", "'bending': .* rank 0 .* nothing to reduce"),
+    "rigid": ([GRAVITY], 8, "spring", "'spring': its projections, .* change by at most"),
+    "one frame": ([GRAVITY, LEFT], 1, "spring", "a run of one or two frames has one snapshot"),
+}
+
+
+@pytest.mark.parametrize("name", NOTHING)
+def test_nothing_to_reduce_is_said_in_words(name):
+    effects, frames, group, words = NOTHING[name]
+    full = api.run(api.build_scene(effects=[*effects, SPRING], mesh=MESH, frames=frames))
+    for asked in {group, group or "spring"}:
+        with pytest.raises(PdromError, match=words):
+            api.train(full, group=asked)
+    if group is None:
+        assert re.search(f"errors none .* none .*{words}", str(full.error(full)))
+        api.plot(full, full)
 
 
 def test_skinning_columns_and_several_runs_enlarge_the_space(full):

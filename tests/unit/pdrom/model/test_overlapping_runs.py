@@ -29,7 +29,7 @@ ACTING: dict[str, dict] = {
     "wind": {"velocity": [0, 5, 5]}, "floor": {"height": 1.9}, "plane": {"point": [0, 1.9, 0]},
     "sphere": {"centre": [0, 1, 0], "radius": 1}, "box": {"lower": [-1, 0, -1], "upper": [1, 2, 1]},
     "self_collision": {"thickness": 0.3}, "kick": {"speed": 3, "seed": 1}, "pins": LATE,
-    "translate": {**LATE, "over": 4, "offset": [0, 0.5, 0]},
+    "velocity": {"value": [0, 1, 2]}, "translate": {**LATE, "over": 4, "offset": [0, 0.5, 0]},
     "rotate": {**LATE, "over": 4, "axis": "x", "degrees": 90},
     "keyframes": {**LATE, "keys": [{"at": 4, "offset": [0, 0.4, 0], "turn": [0, 40, 0]}]},
     "poke": {"over": 3, "rest": 1, "count": 3}, **{group: {"weight": 1e4} for group in GROUPS},

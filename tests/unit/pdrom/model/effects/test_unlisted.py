@@ -34,6 +34,7 @@ IDLE: dict[str, dict | None] = {
     "box": {"lower": [-1, -FAR, -1], "upper": [1, 1 - FAR, 1], "friction": 1},
     "self_collision": {"thickness": 1e-6},
     "kick": {"speed": 1e-300, "seed": 1},
+    "velocity": {"value": [0, 0, 0]},
     "pins": LATE,
     "translate": {**LATE, "offset": [0, 1, 0], "over": 3},
     "rotate": {**LATE, "axis": "x", "degrees": 90, "over": 3},
