@@ -136,10 +136,7 @@ UNFIT = {
     "an old python": (lambda f: f.add_python("3.9", too_old=1), f"{NO_WHEELS} 3.9 .*"),
     "a new python": (lambda f: f.add_python("3.14", too_old=1), f"{NO_WHEELS} 3.14 .*"),
     "no venv": (lambda f: f.add_python(no_venv=1), "has no venv module.*"),
-    "nothing can be made": (
-        lambda f: f.touch(".cache"),
-        "no write permission in .*/a folder, .*",
-    ),
+    "nothing can be made": (lambda f: f.touch(".cache"), "no write permission in .*/a folder, .*"),
     "line break": (lambda f: rename(f, "two\nlines"), ".*line break.*"),
     "line break at the end": (lambda f: rename(f, "ends\n"), ".*line break.*"),
 }

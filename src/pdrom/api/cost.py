@@ -145,7 +145,7 @@ def _grids(scene: Scene) -> list[Coarser]:
 
 def _full_order(scene: Scene, meshes: Sequence[Coarser]) -> Iterator[Setting]:
     config = scene.config
-    counts = dict.fromkeys((*COUNTS, (config.iterations, config.anderson_window)))
+    counts = dict.fromkeys((*COUNTS, (config.count, config.anderson_window)))
     own, coarse = (settings.full_order(scene, *a) for a in ((counts,), (ON_COARSER, meshes)))
     for setting in (*own, *coarse):
         count, method = (setting.labels[key] for key in ("iterations", "method"))

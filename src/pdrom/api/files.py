@@ -206,7 +206,7 @@ def _require_consistent(found: Run, file: h5py.File) -> None:
         steps = np.diff(moved, axis=0, prepend=before) / h
         stored = file["velocities"][...]
         pairs.append(("velocities are not those of the positions", stored, steps))
-    if "objective" in file:
+    if "objective" in file and isinstance(scene.config.iterations, int):
         known, shape = np.zeros((frames, scene.config.iterations)), file["objective"].shape
         pairs.append((f"objective of shape {shape}", np.zeros(shape), known))
     for name, own in file.get("snapshots", {}).items():

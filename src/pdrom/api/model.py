@@ -377,7 +377,7 @@ def _export(scene: Scene, model: SubspaceModel, file: h5py.Group) -> None:
         arrays[f"groups/{group.name}/weights"] = step.group.row_weights, "N/m"
     for name, (values, unit) in arrays.items():
         _put(file, name, values, unit)
-    file.attrs.update(time_step=scene.config.time_step, iterations=scene.config.iterations)
+    file.attrs.update(time_step=scene.config.time_step, iterations=scene.config.count)
 
 
 def load_model(path: str | os.PathLike[str]) -> Model:

@@ -128,7 +128,8 @@ class Run:
     def title(self) -> str:
         """Description of the run by which messages name it as a reference."""
         config = self.scene.config
-        again = f", {config.iterations} iterations a frame" if self.method == FULL else ""
+        count = config.iterations if isinstance(config.iterations, int) else "as many as it takes"
+        again = f", {count} iterations a frame" if self.method == FULL else ""
         return f"the run of '{config.name}' by {self.method}{again}"
 
     def require_finite(self, name: str) -> None:

@@ -12,16 +12,18 @@ import numpy as np
 from numba.core import event
 
 from pdrom.api import files
-from pdrom.api.records import FULL, STILL, Run, standstill, stored_run
+from pdrom.api.records import FULL, STILL, Errors, Run, standstill, stored_run
 from pdrom.core import config_file
 from pdrom.core.errors import ConfigurationError, RankError, SnapshotError, choices
 from pdrom.core.provenance import made_by
 from pdrom.core.store import open_hdf5
 from pdrom.core.yamlfile import shown, validate
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.stepper import PHASES, FrameReport, State
+from pdrom.model.dynamics.convergence import Until
+from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
 from pdrom.model.dynamics.system import DEFAULT_SOLVER
 from pdrom.model.effects.base import Anchors, held_path
+from pdrom.model.runs import WINDOW, remedy, trajectory
 from pdrom.model.runs import run as run_full_order
 from pdrom.model.scene import Scene
 from pdrom.reduction.basis import Basis, group_basis
@@ -55,11 +57,12 @@ def run(
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
     start: Run | None = None,
     frame: int | None = None,
+    estimate: bool = True,
 ) -> Run:
     """Run a scene in full order; snapshots of every group are stored for the training of a basis.
 
-    Log a warning where held vertices or free vertices at rest lie inside an obstacle, and (level
-    INFO) the compilation of kernels, which the first run of a kind of scene waits for.
+    Log a warning where held vertices or free vertices at rest lie inside an obstacle, or if frames
+    are not converged, and (level INFO) the compilation of kernels, for which a first run waits.
 
     Parameters
     ----------
@@ -69,6 +72,7 @@ def run(
     start : run on the same mesh, with the same time step, that goes on in ``scene``
     frame : number of frames of ``start`` that are kept (None: all). Frame numbers, also those of
         holds, count on; a hold that ``start`` has not begins there
+    estimate : estimate the error of every 20th frame, see `pdrom.model.dynamics.convergence`
 
     Returns
     -------
@@ -84,6 +88,7 @@ def run(
     """
     files.require_runnable(scene, out, on_frame)
     begun, method = _begun(scene, start, frame)
+    files.require(bool, estimate, "estimate", source="True or False")
     scene.log_holds()
     scene.log_contacts()
     count, plans = scene.config.frames, scene.config.reduce
@@ -100,9 +105,11 @@ def run(
         path = Path(out or Path(folder, "run.h5"))
         with event.install_listener("numba:compile", _Compilation(scene.config.name)) as compiled:
             later = {group: own[own >= len(begun)] for group, own in frames.items()}
-            run_full_order(scene, path, later, True, on_frame, begun, method)
+            loop = scene.stepper(estimate=estimate)
+            run_full_order(scene, path, later, True, on_frame, begun, method, loop)
         if compiled.done:
             log.info("%s: kernels compiled in %.1f s", scene.config.name, compiled.duration)
+        _warn_unless_converged(scene, loop)
         with open_hdf5(path) as file:
             return stored_run(scene, file)
 
@@ -143,6 +150,38 @@ def _begun(
     ]
     same = all(getattr(own.config, key) == getattr(scene.config, key) for key in ACTING)
     return begun, None if same and start.method == FULL else f"continuing {start.title}, frame {n}"
+
+
+def _warn_unless_converged(scene: Scene, loop: Stepper) -> None:
+    """Log a warning if frames of a run by ``loop`` are not converged, with a remedy."""
+    asked, limit, after, worst = scene.config.iterations, 0.05, "", getattr(loop, "worst", None)
+    if isinstance(asked, Until):
+        limit, after = asked.error, f" after {asked.most} iterations (most)"
+    if worst and worst[0] > limit:
+        error, frame, state = worst
+        log.warning(
+            "%s: frames are not converged%s: the estimated error of frame %d is %.2g of its motion "
+            "(allowed %g); tried on it: %s; --check estimates the error of the run",
+            scene.config.name, after, frame, error, limit, remedy(scene, state, frame),
+        )  # fmt: skip
+
+
+def check(full: Run) -> Errors:
+    """Estimate the error of a run from a second one with twice the iterations, accelerated.
+
+    It is too small if that run is far from converged, too. SnapshotError if that run blows up.
+    """
+    scene = files.require_run(full, "full").scene
+    if full.method != FULL:
+        raise ConfigurationError(f"{full.title}: a full-order run is required")
+    more, title = scene.config.iterations, "a tenth of its frame errors"
+    if isinstance(more, Until):
+        more = more.model_copy(update={"error": more.error / 10, "most": 2 * more.most})
+    else:
+        more, title = 2 * more, f"{2 * more} accelerated iterations a frame"
+    moved = trajectory(scene.iterated(more, scene.config.anderson_window or WINDOW))
+    second = Run(scene, moved, np.zeros(len(moved) - 1), method=f"{FULL}, {title}")
+    return full.error(files.require_run(second, "second run"))
 
 
 def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:

@@ -70,6 +70,7 @@ def arguments(scene: Scene, given: Mapping[str, Any]) -> Arguments:
     changed |= {key for key in ("basis", "selection") if given.get(key) is not None}
     changed |= {"others"} if given["others"] else set()
     local = method is not None or asked.group is not None
+    _ = scene.config.count  # a model has a number of iterations
     apart = {
         "with group or method": (local, changed - {"group", "r", "validate"}),
         "without group or method": (not local, changed & {"r"}),

@@ -17,6 +17,7 @@ def perform(arguments: argparse.Namespace) -> Status:
 
     from pdrom.api import load, load_model, load_scene, run
     from pdrom.api.records import standstill
+    from pdrom.api.runs import check
     from pdrom.command.progress import Progress
     from pdrom.core.errors import ConfigurationError
     from pdrom.model.mesh.checks import seams
@@ -24,10 +25,16 @@ def perform(arguments: argparse.Namespace) -> Status:
     file, scene = Path(arguments.scene), load_scene(arguments.scene)
     others = arguments.model, arguments.compare, arguments.start
     read = [*files_of(arguments.scene, scene), *filter(None, others)]
+    if arguments.check and arguments.start:
+        raise ConfigurationError(
+            "--check: only of runs from the scene's own start (without --from)"
+        )
     if arguments.start and arguments.model:
         raise ConfigurationError("--from: only of runs in full order (without --model)")
     if arguments.compare and not arguments.model:
         raise ConfigurationError("--compare: only of runs with a model (--model)")
+    if arguments.model and (arguments.check or arguments.no_estimate):
+        raise ConfigurationError("--check, --no-estimate: only of runs in full order (no --model)")
     name = file.stem
     if arguments.model:
         name += f"_{Path(arguments.model).stem.removesuffix('.model')}"
@@ -40,7 +47,8 @@ def perform(arguments: argparse.Namespace) -> Status:
         raise ConfigurationError(f"--compare {arguments.compare}: {fault}")
     tick = Progress(scene.config.name, scene.config.frames)
     start = load(arguments.start, arguments.unchecked) if arguments.start else None
-    made = model.run(scene, out, tick) if model else run(scene, out, tick, start, arguments.frame)
+    begin = start, arguments.frame, not arguments.no_estimate
+    made = model.run(scene, out, tick) if model else run(scene, out, tick, *begin)
     sys.stdout.write(
         f"{out}: {len(made.ms)} frames of {scene.mesh.vertices} vertices ({seams(scene.mesh)}), "
         f"{np.median(made.ms):.2f} ms a frame (median)\n"
@@ -49,6 +57,8 @@ def perform(arguments: argparse.Namespace) -> Status:
         sys.stdout.write(f"{out}: {still}\n")
     if model and reference:
         sys.stdout.write(f"{_compared(model, made, reference)}\n")
+    if arguments.check:
+        sys.stdout.write(f"estimated error of the run: {check(made)}\n")
     if made.blowup_frame is not None:
         sys.stdout.write(f"{out}: blew up in frame {made.blowup_frame}\n")
         return Status.BLEW_UP
@@ -82,6 +92,8 @@ COMMAND = Command(
             "help": "file to write (HDF5); SCENE.h5 beside the scene without it, SCENE_MODEL.h5 "
             "with a model",
         },
+        "--check": {"action": "store_true", "help": "estimate its error by a second, finer run"},
+        "--no-estimate": {"action": "store_true", "help": "do not estimate errors of frames"},
         "--unchecked": UNCHECKED,
     },
     perform,

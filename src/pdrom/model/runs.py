@@ -13,6 +13,7 @@ import numpy as np
 
 from pdrom.core.store import write_hdf5
 from pdrom.model.dynamics.acceleration import minimise
+from pdrom.model.dynamics.convergence import EstimatingStepper, frame_error
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import PHASES, FrameReport, State, Stepper
 from pdrom.model.dynamics.system import GlobalSystem
@@ -23,6 +24,7 @@ log = logging.getLogger(__name__)
 
 # A run ends as a blow-up if its bounding box exceeds this multiple of that of the rest shape.
 BLOWUP_EXTENT = 100.0
+TRIED, WINDOW, NEAR = (20, 50, 100, 200, 500, 1000, 2000), 5, 0.01  # of `remedy`
 
 
 def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any) -> np.ndarray:
@@ -113,6 +115,18 @@ def converged_run(
     return np.stack(positions) if best.converged else None
 
 
+def remedy(scene: Scene, state: State, frame: int) -> str:
+    """Try how many accelerated iterations bring ``frame`` from ``state`` within 1 %; say it."""
+    start, window = state.positions, scene.config.anderson_window or WINDOW
+    best = ConvergedStepper(scene, scene.system, 1e-11, 10_000).step(state, frame)[0].positions
+    for count in TRIED:
+        loop = scene.iterated(count, window).stepper(track_objective=False)
+        found = loop.step(state, frame)[0].positions
+        if frame_error(found, best, start, scene.masses, scene.mesh.extent) <= NEAR:
+            return f"iterations: {count} with anderson_window: {window} bring it within {NEAR:.0%}"
+    return f"{count:,} accelerated iterations do not bring it within {NEAR:.0%}"
+
+
 def run(
     scene: Scene,
     path: str | os.PathLike[str],
@@ -121,6 +135,7 @@ def run(
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
     begun: Sequence[tuple[State, FrameReport]] = (),
     method: str | None = None,
+    loop: Stepper | None = None,
 ) -> None:
     """Run a scene; write positions, velocities, objective, timings and the requested snapshots.
 
@@ -133,9 +148,11 @@ def run(
     path : HDF5 file that is written
     begun : states and reports after the first frames, which are not computed then
     method : description of a run that does not begin at the initial state of ``scene``
+    loop : step loop of the scene; errors of frames that it estimates are written, too, else nan
     """
-    frames = scene.config.frames
-    loop, state = scene.stepper(), scene.initial_state()
+    frames, asked = scene.config.frames, scene.config.iterations
+    tracked = asked if isinstance(asked, int) else 0  # else, each frame has its own number
+    loop, state = loop or scene.stepper(), scene.initial_state()
     with write_hdf5(path) as file:
         if with_mesh:
             store_mesh(scene.mesh, file.create_group("mesh"))
@@ -143,7 +160,7 @@ def run(
         shapes = {
             "positions": ((frames + 1, n, 3), "m"),
             "velocities": ((frames + 1, n, 3), "m/s"),
-            "objective": ((frames, scene.config.iterations), "J"),
+            "objective": ((frames, tracked), "J"),
             "timings": ((frames, len(PHASES)), "ms"),
         }
         series = {}
@@ -160,13 +177,15 @@ def run(
                 state, report = loop.step(state, frame, recorder.observer(frame))
             series["positions"][frame + 1] = state.positions
             series["velocities"][frame + 1] = state.velocities
-            series["objective"][frame] = report.objective
+            series["objective"][frame] = report.objective[:tracked]
             series["timings"][frame] = 1e3 * report.seconds
             on_frame(frame, report)
             if (frame + 1) % max(1, frames // 10) == 0:
                 log.info("%s: frame %d of %d", scene.config.name, frame + 1, frames)
         file.attrs["factorisations"] = scene.system.factorisations
         file.attrs.update({"method": method} if method else {})
+        if isinstance(loop, EstimatingStepper):
+            file["frame_error"] = [loop.errors.get(frame, np.nan) for frame in range(frames)]
 
 
 class _SnapshotRecorder:
@@ -202,20 +221,8 @@ class _SnapshotRecorder:
         return record
 
 
-Advance = Callable[[State, int], tuple[State, FrameReport]]
 Run = Callable[[State, range], Iterator[tuple[State, FrameReport]]]
 """Function of a state and frames that yields each next state and report, as `Stepper.run`."""
-
-
-def frame_by_frame(advance: Advance) -> Run:
-    """Return a function of state and frames (`Run`) that computes each frame by ``advance``."""
-
-    def run(state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
-        for frame in frames:
-            state, report = advance(state, frame)
-            yield state, report
-
-    return run
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ as warnings. Masses are lumped: all vertices have equal masses, or selected ones
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import combinations
 from typing import Annotated, Any, Self
 
@@ -17,6 +17,7 @@ from pdrom.core.errors import SceneError
 from pdrom.core.yamlfile import ConfigModel, SceneName
 from pdrom.model.constraints.base import ConstraintGroup, GroupConfig
 from pdrom.model.dynamics.acceleration import Anderson
+from pdrom.model.dynamics.convergence import EstimatingStepper, Iterations, Until
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import LocalStep, State, Stepper
 from pdrom.model.dynamics.system import DEFAULT_SOLVER, GlobalSystem
@@ -73,7 +74,7 @@ class SceneConfig(ConfigModel):
     title: str
     mesh: MeshConfig
     time_step: Annotated[float, Field(ge=1e-9, le=10.0)] = 0.016
-    iterations: Annotated[int, Field(ge=1, le=10_000)] = 10
+    iterations: Iterations = 10
     anderson_window: Annotated[int, Field(ge=0, le=50)] = 0
     frames: Annotated[int, Field(ge=1, le=1_000_000)]
     vertex_mass: Mass = 10.0
@@ -101,6 +102,14 @@ class SceneConfig(ConfigModel):
                     f"reduce.{group}.train = {plan.train}: only {even} even frames in {self.frames}"
                 )
         return self
+
+    @property
+    def count(self) -> int:
+        """Number of iterations of each frame; SceneError if every frame has its own."""
+        if isinstance(self.iterations, int):
+            return self.iterations
+        fault = "only runs in full order iterate until an error; a number is required here"
+        raise SceneError(f"scene '{self.name}': iterations = {dict(self.iterations)}: {fault}")
 
     @property
     def groups(self) -> list[str]:
@@ -242,7 +251,7 @@ class Scene:
         config = self.config.model_copy(update=keys)
         return self._bound(config, self.mesh, self.masses)
 
-    def iterated(self, iterations: int, window: int = 0) -> "Scene":
+    def iterated(self, iterations: int | Until, window: int = 0) -> "Scene":
         """Return the scene with numbers of iterations and of Anderson differences (0: none)."""
         changes = {"iterations": iterations, "anderson_window": window}
         return replace(self, config=self.config.model_copy(update=changes))
@@ -324,17 +333,22 @@ class Scene:
         system: GlobalSystem | None = None,
         local_steps: Sequence[LocalStep] | None = None,
         track_objective: bool = True,
+        estimate: bool = False,
     ) -> Stepper:
         """Return the step loop, with ``local_steps`` in place of the groups if given.
 
-        ``system`` replaces the global system; ``track_objective`` adds objectives to frame reports.
+        ``system`` replaces the global system; ``track_objective`` adds objectives to frame reports;
+        with ``estimate``, or iterations until an error, the loop is an `EstimatingStepper`.
         """
-        return Stepper(
+        asked, own = self.config.iterations, (self.mesh.extent, self.config.frames)
+        until = asked if isinstance(asked, Until) and local_steps is None else None
+        kind = partial(EstimatingStepper, until, *own) if until or estimate else Stepper
+        return kind(
             self.space(system or self.system),
             self.config.time_step,
-            self.config.iterations,
+            until.most if until else self.config.count,
             local_steps=self.groups if local_steps is None else local_steps,
-            track_objective=track_objective,
+            track_objective=track_objective and until is None,
             acceleration=self.acceleration(),
         )
 

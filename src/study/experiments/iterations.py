@@ -99,7 +99,7 @@ def iterations(
 def settings(scene: Scene, asked: IterationCounts) -> Iterator[Setting]:
     """Yield the full order of ``scene`` with all numbers of iterations, on all meshes."""
     coarse = grids(scene, asked.coarser)
-    counts = sorted({*asked.counts, scene.config.iterations}), sorted(asked.coarser_counts)
+    counts = sorted({*asked.counts, scene.config.count}), sorted(asked.coarser_counts)
     places: tuple[Sequence[Coarser | None], ...] = ((None,), coarse)
     for meshes, numbers in zip(places, counts, strict=True):
         pairs = accelerated(numbers, asked.anderson_window)

@@ -106,7 +106,7 @@ def contributions(scene: Scene) -> pd.DataFrame:
     space = VertexSpace(scene.system, scene.forces, scene.boundaries, contacts=watched)  # type: ignore[arg-type]
     config = scene.config
     loop = Stepper(
-        space, config.time_step, config.iterations, local_steps=scene.groups, track_objective=False,
+        space, config.time_step, config.count, local_steps=scene.groups, track_objective=False,
         acceleration=scene.acceleration(),
     )  # fmt: skip
     state, rows = scene.initial_state(), []
@@ -206,7 +206,7 @@ def sensitivities(
     )
     variants = {
         "solver": trajectory(scene, system=scene.system_with(OTHER_SOLVER)),
-        "iterations x4": trajectory(scene.changed(iterations=4 * config.iterations)),
+        "iterations x4": trajectory(scene.changed(iterations=4 * config.count)),
         # the scene is built anew, which checks that there are not too many frames
         "h/2": trajectory(Scene.build(halved.config, halved.mesh))[::2],
     }

@@ -202,7 +202,7 @@ def _full_order(
         steps = [step(group) for group in scene.groups]
         fewer = min(frames, getattr(asked, f"{name}_frames"))
         made.append(variant(scene, fewer, {**common, "implementation": name}, steps))
-    slow, whole = made.pop(), scene.config.iterations
+    slow, whole = made.pop(), scene.config.count
     slow.loop.iterations = min(whole, asked.interpreted_iterations)
     return replace(slow, share=slow.loop.iterations / whole), made
 

@@ -106,6 +106,7 @@ def read_scene(root: Path, name: str, coarsen: Coarsen = UNCHANGED) -> SceneConf
     scene = validate(SceneConfig, named(read_yaml(path), name), str(path))
     if scene.name != name:
         raise ConfigurationError(f"{path}: name = '{scene.name}', required: '{name}', as the file")
+    _ = scene.count  # the study's scenes have a number of iterations
     if isinstance(scene.mesh, MeshFile):
         folder = path.parent.relative_to(root).as_posix()
         scene = scene.model_copy(update={"mesh": scene.mesh.below(folder)})

@@ -81,7 +81,7 @@ def training_run(
     steps = [watched, *(SubspaceLocalStep(group, columns) for group in scene.groups[1:])]
     space = ReducedSpace(scene, columns, [step.matrix for step in steps])
     config, iterates = scene.config, watched.iterates
-    loop = Stepper(space, config.time_step, config.iterations, steps, track_objective=False)
+    loop = Stepper(space, config.time_step, config.count, steps, track_objective=False)
     state = start or reduced_state(scene, columns)
     kept: list[TrainingFrame] = []
     measures: dict[bytes, np.ndarray] = {}

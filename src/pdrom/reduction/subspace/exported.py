@@ -43,7 +43,7 @@ def export_scene(scene: Scene) -> dict[str, Any]:
     floors = [contact.config.height for contact in scene.contacts]
     return {
         "timeStep": scene.config.time_step,
-        "iterations": scene.config.iterations,
+        "iterations": scene.config.count,
         "frames": scene.config.frames,
         "points": pack_array(scene.mesh.points, "f8"),
         "masses": pack_array(scene.masses, "f8"),

@@ -45,7 +45,7 @@ class FusedStepper(Stepper):
         self, scene: Scene, space: ReducedSpace, local_steps: Sequence[LocalStep], newton: bool
     ) -> None:
         config, acceleration = scene.config, None if newton else scene.acceleration()
-        h, iterations = config.time_step, config.iterations
+        h, iterations = config.time_step, config.count
         super().__init__(space, h, iterations, local_steps, False, acceleration)
         self._fused: _Fused | None = None
         steps = [step for step in self.local_steps if isinstance(step, SubspaceLocalStep)]

@@ -18,16 +18,16 @@ Without pins, the smallest mass divided by h^2 is a lower bound of lambda_min, a
 masses are round-off compared with the weights of the groups, so that only pins make A regular.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pdrom.core.yamlfile import validate
-from pdrom.model.dynamics.stepper import State, Stepper
+from pdrom.model.dynamics.stepper import FrameReport, State, Stepper
 from pdrom.model.mesh.types import Mesh
-from pdrom.model.runs import BoundedRun, frame_by_frame
+from pdrom.model.runs import BoundedRun
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.subspace.model import SubspaceModel
 
@@ -270,7 +270,12 @@ def record(
     roundoff = Roundoff(scene, loop, None if model is None else model.columns.B)
     positions: Callable[[np.ndarray], np.ndarray] = model.positions if model else lambda y: y
     states, excesses = [(positions(state.positions), positions(state.velocities))], list[float]()
-    frames = frame_by_frame(loop.step)
+
+    def frames(state: State, numbers: range) -> Iterator[tuple[State, FrameReport]]:
+        for number in numbers:
+            state, report = loop.step(state, number)
+            yield state, report
+
     run = BoundedRun(frames, state, scene.config.frames, limit, positions=positions)
     for frame in run:
         before, after, values = state, frame.state, frame.report.objective

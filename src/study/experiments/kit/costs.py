@@ -146,7 +146,7 @@ def effect_costs(scene: Scene, frames: int, warmup: int, repeats: int) -> pd.Dat
     by_role: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
     groups, *others = by_role
     space, config = VertexSpace(scene.system, *others), scene.config
-    loop = Stepper(space, config.time_step, config.iterations, groups, track_objective=False)
+    loop = Stepper(space, config.time_step, config.count, groups, track_objective=False)
     stands = [stand for role in by_role for stand in role]
     names = list(dict.fromkeys(stand.name for stand in stands))
     samples = [_profile(loop, scene, frames, stands, names) for _ in range(warmup + repeats)]

@@ -269,10 +269,7 @@ def test_a_file_without_a_checksum_inside_is_refused_unless_asked_for(plain):
     with open_hdf5(plain, unchecked=True) as file:
         assert file["x"][...].sum() == 499500
     os.truncate(plain, 3000)
-    with (
-        pytest.raises(StorageError, match=r"old\.h5: cannot be read"),
-        open_hdf5(plain, True),
-    ):
+    with pytest.raises(StorageError, match=r"old\.h5: cannot be read"), open_hdf5(plain, True):
         pass
     assert sorted(plain.parent.iterdir()) == sorted([plain, store.checksum_path(plain)])
 

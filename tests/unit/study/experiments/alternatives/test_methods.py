@@ -15,11 +15,7 @@ from pdrom.model.runs import ConvergedStepper, converged_run, followed
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
 from pdrom.reduction.subspace.training import make_columns
 from study.experiments.alternatives.experiment import substepped
-from study.experiments.alternatives.solvers.methods import (
-    Chebyshev,
-    TwoLevel,
-    measured_rate,
-)
+from study.experiments.alternatives.solvers.methods import Chebyshev, TwoLevel, measured_rate
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 HELD = (GRAVITY, LEFT)
