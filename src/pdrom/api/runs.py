@@ -158,11 +158,10 @@ def _warn_unless_converged(scene: Scene, loop: Stepper) -> None:
     if isinstance(asked, Until):
         limit, after = asked.error, f" after {asked.most} iterations (most)"
     if worst and worst[0] > limit:
-        error, frame, state = worst
         log.warning(
             "%s: frames are not converged%s: the estimated error of frame %d is %.2g of its motion "
             "(allowed %g); tried on it: %s; --check estimates the error of the run",
-            scene.config.name, after, frame, error, limit, remedy(scene, state, frame),
+            scene.config.name, after, worst[1], worst[0], limit, remedy(scene, worst[2], worst[1]),
         )  # fmt: skip
 
 

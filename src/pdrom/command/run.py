@@ -25,16 +25,15 @@ def perform(arguments: argparse.Namespace) -> Status:
     file, scene = Path(arguments.scene), load_scene(arguments.scene)
     others = arguments.model, arguments.compare, arguments.start
     read = [*files_of(arguments.scene, scene), *filter(None, others)]
-    if arguments.check and arguments.start:
-        raise ConfigurationError(
-            "--check: only of runs from the scene's own start (without --from)"
-        )
-    if arguments.start and arguments.model:
-        raise ConfigurationError("--from: only of runs in full order (without --model)")
-    if arguments.compare and not arguments.model:
-        raise ConfigurationError("--compare: only of runs with a model (--model)")
-    if arguments.model and (arguments.check or arguments.no_estimate):
-        raise ConfigurationError("--check, --no-estimate: only of runs in full order (no --model)")
+    part, whole = arguments.model, "only of runs in full order (without --model)"
+    for wrong, fault in (
+        (arguments.start and part, f"--from: {whole}"),
+        (arguments.compare and not part, "--compare: only of runs with a model (--model)"),
+        (arguments.check and (part or arguments.start), f"--check: {whole}, and without --from"),
+        (arguments.no_estimate and part, f"--no-estimate: {whole}"),
+    ):
+        if wrong:
+            raise ConfigurationError(fault)
     name = file.stem
     if arguments.model:
         name += f"_{Path(arguments.model).stem.removesuffix('.model')}"

@@ -221,10 +221,6 @@ class _SnapshotRecorder:
         return record
 
 
-Run = Callable[[State, range], Iterator[tuple[State, FrameReport]]]
-"""Function of a state and frames that yields each next state and report, as `Stepper.run`."""
-
-
 @dataclass(frozen=True)
 class Frame:
     """State at the end of a frame in which all positions are finite.
@@ -247,13 +243,13 @@ class Frame:
 class BoundedRun:
     """Iterator over the frames of a run, which ends if the run blows up.
 
-    run : function that computes frames, possibly more than are yielded
+    run : yields the states and reports after frames, as `Stepper.run`, maybe more than are yielded
     limit : largest allowed ratio of the longest side of the bounding box to ``unit`` (m)
     positions : function that maps the positions in states of ``run`` to vertex positions (N, 3) m
     blowup_frame : first frame that is not finite (not yielded) or exceeds the limit, else None
     """
 
-    run: Run
+    run: Callable[[State, range], Iterator[tuple[State, FrameReport]]]
     state: State
     frames: int
     limit: float = np.inf

@@ -1,10 +1,9 @@
 """Error of a frame: how far its last iterate is from the converged frame with the same start.
 
-A local and a global step map an iterate y to G(y); the converged frame is the fixed point of G.
-With r = G(y) - y and the derivative G' at y, its distance d from y solves (I - G') d = r to first
-order. The estimate is |d| of the Galerkin solution in the Krylov space of r (Saad 1981), where
-differences of G replace products with G'. The error is |d| over the larger of the frame's motion
-|y - q| and `REST` times the extent; norms are mass-weighted root mean squares over vertices, m.
+A local and a global step map an iterate y to G(y); the converged frame is the fixed point y + d.
+With r = G(y) - y and the derivative G' at y, (I - G') d = r to first order. The estimate is |d| of
+the Galerkin solution in the Krylov space of r (Saad 1981), with differences of G. The error is |d|
+over the motion |y - q|, at least `REST` times the extent, in mass-weighted root mean squares.
 """
 
 from contextlib import suppress
@@ -18,18 +17,16 @@ from pdrom.core.yamlfile import ConfigModel, describe
 from pdrom.model.compiled.rows import WIDTH, flat
 from pdrom.model.dynamics.stepper import Observer, State, Stepper
 
-DIRECTIONS = 10  # dimension of the Krylov space; less if a frame has fewer iterations
-EVERY, BEGIN = 20, 10  # every 20th frame from frame 10 on; ten iterations before a first estimate
+DIRECTIONS, EVERY, BEGIN = 10, 20, 10  # of the Krylov space; frames 10, 30, 50, ... are estimated
 STEP = 1e-7  # length of the differences of G over the extent: round-off and curvature stay small
 REST = 1e-6  # least motion that counts, over the extent: the scale of a body at rest
-Count = Annotated[int, Field(ge=1, le=10_000)]
 
 
 class Until(ConfigModel):
     """Iterate each frame until its estimated error is at most ``error``, or ``most`` times."""
 
     error: Annotated[float, Field(ge=1e-8, lt=1.0)]
-    most: Count = 2000
+    most: Annotated[int, Field(ge=1, le=10_000)] = 2000
 
 
 def _until(entry: Any) -> Any:
@@ -39,12 +36,10 @@ def _until(entry: Any) -> Any:
         raise ValueError(describe(error, Until)) from error
 
 
-Iterations = Annotated[Count | Until, BeforeValidator(_until)]
+Iterations = Annotated[Annotated[int, Field(ge=1, le=10_000)] | Until, BeforeValidator(_until)]
 
 
-def frame_error(
-    y: np.ndarray, converged: np.ndarray, before: np.ndarray, masses: np.ndarray, extent: float
-) -> float:
+def frame_error(y: Any, converged: Any, before: Any, masses: np.ndarray, extent: float) -> float:
     """Error of a frame from positions ``before`` to ``y``; all are (N, 3) m, ``masses`` (N,)."""
     root = np.sqrt(masses / masses.sum())[:, None]
     far, moved = (float(np.linalg.norm(root * (y - other))) for other in (converged, before))
@@ -72,14 +67,13 @@ class EstimatingStepper(Stepper):
         if not self._due:
             return super().step(state, frame, on_last_iterate)
         self._start = flat(state.positions)
-        # with an observer, a frame is not one compiled call, whose last iterate is unknown
-        after = super().step(state, frame, on_last_iterate or (lambda y: None))
+        after = super().step(state, frame, on_last_iterate or (lambda y: None))  # not as one call
         if self._found > (self.worst[0] if self.worst else -1.0):
             self.worst = self._found, frame, state
         self.errors[frame] = self._found
         return after
 
-    def _iterate(self, s: Any, base: Any, system: Any, seconds: np.ndarray, watch: Observer) -> Any:
+    def _iterate(self, s: Any, base: Any, system: Any, seconds: Any, watch: Any) -> Any:
         if self._until is None:
             y, objective = super()._iterate(s, base, system, seconds, watch)
             if self._due:
@@ -91,8 +85,7 @@ class EstimatingStepper(Stepper):
             self._advance(more, y, s, base, system)
             done += more
             self._found = self._error(y, s, base, system)
-        if watch is not None:
-            watch(y)
+        watch(y)
         seconds[1] += perf_counter() - started
         return y, np.empty(0)
 

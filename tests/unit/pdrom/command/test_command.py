@@ -345,7 +345,7 @@ FAULTY = [
     (["run", "small.yaml", "--frame", "3"], "--frame: only with --from"),
     (["run", "small.yaml", "--from", "x.h5", "--model", "x.h5"], "--from: only of runs in full"),
     (["run", "small.yaml", "--from", "small.h5"], "is read by this command"),
-    (["run", "small.yaml", "--model", "none.h5", "--check"], "--check, --no-estimate: only of"),
+    (["run", "small.yaml", "--model", "none.h5", "--check"], "--check: only of runs in full"),
     (["run", "small.yaml", "--model", "x.h5", "--out", "x.h5"], "is read by this command"),
     (["run", "small.yaml", "--out", "."], ".: cannot be written (a folder)"),
     (["run", "small.yaml", "--out", "small.yaml"], "is read by this command"),
