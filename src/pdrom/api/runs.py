@@ -71,7 +71,7 @@ def run(
     on_frame : called after each frame with its number, from 0, and the solver's report
     start : run on the same mesh, with the same time step, that goes on in ``scene``
     frame : number of frames of ``start`` that are kept (None: all). Frame numbers, also those of
-        holds, count on; a hold that ``start`` has not begins there
+        holds, count on; pins that ``start`` has not begin there, and handles at their ``start``
     estimate : estimate the error of every 20th frame, see `pdrom.model.dynamics.convergence`
 
     Returns
@@ -83,8 +83,9 @@ def run(
     Raises
     ------
     ConfigurationError, StorageError
-        ``scene`` is no scene; ``start`` does not suit it or has no such frame; ``out`` cannot be
-        written, which is checked before the run.
+        ``scene`` is no scene; ``start`` does not suit it or has no such frame; a handle or initial
+        velocity of ``scene`` would begin before it; ``out`` cannot be written. All is checked
+        before the run.
     """
     files.require_runnable(scene, out, on_frame)
     begun, method = _begun(scene, start, frame)
@@ -136,13 +137,24 @@ def _begun(
     last = min(len(start.ms), frames - 1)
     if not isinstance(n, (int, np.integer)) or not 1 <= n <= last:
         ends = f"the run has {len(start.ms)} frames, and the scene ends after frames = {frames}"
-        raise ConfigurationError(f"frame = {shown(n, 60)}: allowed are 1 to {last}, as {ends}")
+        allowed = f"allowed are 1 to {last} (--frame), as {ends}" if last else f"{ends}: raise it"
+        raise ConfigurationError(f"frame = {shown(n, 60)}: {allowed}")
     q, anchors = start.positions[: n + 1].astype(float), Anchors()
     for k in range(n):
         *_, anchors = held_path(own.boundaries, range(k, k + 1), q[k], anchors)
     any_end, holds = {"until": None}, (own.boundaries, scene.boundaries)
     had, has = ([b.config.model_copy(update=any_end) for b in each] for each in holds)
-    anchors = tuple(anchors[had.index(hold)] if hold in had else None for hold in has)
+    kept: list[np.ndarray | None] = []  # pins need none: they stay where they are in frame n
+    for each, hold in zip(has, scene.boundaries, strict=True):
+        kept.append(anchors[had.index(each)] if hold.moves and each in had else None)
+        if hold.moves and kept[-1] is None and hold.active(n) and not hold.takes_hold(n):
+            fault = f"effect '{hold.name}' begins before frame {n}, where start does not move it"
+            raise ConfigurationError(f"{fault}: it would jump; start: {n} begins it there")
+    for first in scene.starts:
+        if first.config not in [each.config for each in own.starts]:
+            fault = f"effect '{first.name}' acts at frame 0 only, where start has none like it"
+            raise ConfigurationError(f"{fault}: leave it out of a scene that goes on")
+    anchors = tuple(kept)
     unknown, part = np.full(1, np.nan), 1e-3 / len(PHASES)  # the phases' times are not told apart
     begun = [
         (State(after, (after - before) / h, anchors), FrameReport(unknown, np.full(4, part * ms)))

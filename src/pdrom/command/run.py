@@ -27,7 +27,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     read = [*files_of(arguments.scene, scene), *filter(None, others)]
     part, whole = arguments.model, "only of runs in full order (without --model)"
     for wrong, fault in (
-        (arguments.start and part, f"--from: {whole}"),
+        (part and (arguments.start or arguments.frame is not None), f"--from, --frame: {whole}"),
         (arguments.compare and not part, "--compare: only of runs with a model (--model)"),
         (arguments.check and (part or arguments.start), f"--check: {whole}, and without --from"),
         (arguments.no_estimate and part, f"--no-estimate: {whole}"),

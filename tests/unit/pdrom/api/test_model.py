@@ -180,8 +180,8 @@ BENDING = {"effect": "bending", "weight": 0.1}
 NOTHING = {  # effects, frames, group, message
     "at rest": ([], 8, None, "nothing moves: 30 free .* by at most .* m, below 1e-06 of"),
     "no gravity": ([GRAVITY | {"acceleration": [0] * 3}, LEFT], 8, None, "nothing moves: 25 free"),
-    "all held": ([GRAVITY, {"effect": "pins", **EVERY}], 8, None, "nothing moves: 0 free"),
-    "all carried": ([GRAVITY, CARRIED], 8, None, "nothing moves: 0 free"),
+    "all held": ([GRAVITY, {"effect": "pins", **EVERY}], 8, None, "all 30 vertices are held"),
+    "all carried": ([GRAVITY, CARRIED], 8, None, "all 30 vertices are held"),
     "flat": ([GRAVITY, LEFT, BENDING], 8, "bending", "'bending': .* rank 0 .* nothing to reduce"),
     "rigid": ([GRAVITY], 8, "spring", "'spring': its projections, .* change by at most"),
     "one frame": ([GRAVITY, LEFT], 1, "spring", "a run of one or two frames has one snapshot"),

@@ -46,13 +46,12 @@ def test_a_run_that_goes_on_is_the_uninterrupted_one_bit_for_bit(group, tmp_path
 def test_another_scene_goes_on_from_a_run_and_says_so(tmp_path):
     """A hold that the first run has not begins where its vertices are then."""
     first, own = api.run(scene(GRAVITY, VELOCITY, SPRING)), scene(SPRING, ENDING)
-    found, bottom = (
-        api.run(own, tmp_path / "a.h5", start=first, frame=6),
-        own.boundaries[0].vertices,
-    )
+    found, bottom = api.run(own, start=first, frame=6), own.boundaries[0].vertices
     assert np.array_equal(found.positions[:7], first.positions[:7])
     assert (found.positions[7:14, bottom] == first.positions[6, bottom]).all()
-    assert api.load(tmp_path / "a.h5").title.endswith(f"by continuing {first.title}, frame 6")
+    again = api.run(own, tmp_path / "a.h5", start=found, frame=9)  # pins do not return to rest
+    assert np.array_equal(again.positions, found.positions)
+    assert api.load(tmp_path / "a.h5").title.endswith(f"by continuing {found.title}, frame 9")
     with pytest.raises(ConfigurationError, match="a run in full order is required"):
         api.train(found)
 
@@ -65,9 +64,22 @@ def test_a_run_goes_on_only_on_its_mesh_and_from_a_frame_of_it():
         ("other points", {"mesh": (points + 1e-9, triangles)}, 3),
         ("other triangles", {"mesh": (points, triangles[:, [1, 2, 0]])}, 3),
         (r"other time_step \(0.016 for 0.01\) than the scene", {"time_step": 0.01}, 3),
-        ("frame = 17: allowed are 1 to 16, as the run has 16 frames", longer, 17),
+        ("frame = 17: allowed are 1 to 16 .--frame., as the run has 16 frames", longer, 17),
         ("frame = 0: allowed are 1 to 16", longer, 0),
         ("frame = 16: allowed are 1 to 15", {}, None),
+        ("frame = 1: the run has 16 frames, and .* after frames = 1: raise it", {"frames": 1}, 1),
     ):
         with pytest.raises(ConfigurationError, match=words):
             api.run(scene(SPRING, **keys), start=first, frame=frame)
+
+
+@pytest.mark.parametrize(
+    ("effect", "words"),
+    [(HANDLE, "'translate' begins before frame 5, .* it would jump; start: 5 begins it there"),
+     ({"effect": "poke", "over": 8, "count": 1}, "'poke' begins before frame 5"),
+     (VELOCITY, "'velocity' acts at frame 0 only, .* leave it out")],
+)  # fmt: skip
+def test_a_motion_that_should_have_begun_before_a_run_goes_on_is_refused(effect, words):
+    first = api.run(scene(SPRING, {**HANDLE, "offset": [0, 0, 1]}))
+    with pytest.raises(ConfigurationError, match=words):
+        api.run(scene(SPRING, effect), start=first, frame=5)
