@@ -46,7 +46,7 @@ class Solid(EffectConfig):
         try:
             return tuple(effect_config(each, 0) for each in (own, other) if each["weight"])
         except ValueError as error:
-            given = f"young = {self.young:g}, poisson = {self.poisson:g}"
+            given = f"young = {self.young:g}, poisson = {self.poisson}"
             raise ValueError(f"effects: {given}: too stiff ({error})") from error
 
 

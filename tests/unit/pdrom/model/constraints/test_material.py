@@ -45,6 +45,7 @@ OWN, BARE = {"weight": 1.0}, {"effect": "strain", "thickness": 1e-3}
      ([SOLID | {"poisson": 0.5}], "poisson = 0.5: Input should be less than 0.5"),
      ([SHEET | {"poisson": -0.1}], "poisson = -0.1: Input should be greater than or equal to 0"),
      ([SOLID | {"young": 1e15, "poisson": 0.49}], "young = 1e+15, poisson = 0.49: too stiff"),
+     ([SOLID | {"poisson": 0.49999999999}], "young = 2e+06, poisson = 0.49999999999: too stiff"),
      ([SOLID, {"effect": "volume"} | OWN], "twice: deformation_gradient, volume, volume; young"),
      ([{"effect": "area"} | OWN, SHEET], "twice: area, strain, area; young"),
      ([{"effect": "bending", "stiffness": 1e-3}], "(bending): unknown key 'stiffness'")],
