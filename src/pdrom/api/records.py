@@ -128,8 +128,10 @@ class Run:
     def title(self) -> str:
         """Description of the run by which messages name it as a reference."""
         config = self.scene.config
-        count = config.iterations if isinstance(config.iterations, int) else "as many as it takes"
-        again = f", {count} iterations a frame" if self.method == FULL else ""
+        asked = config.iterations
+        until = getattr(asked, "error", None)
+        often = f"frame errors of {until}" if until else f"{asked} iterations a frame"
+        again = f", {often}" if self.method == FULL else ""
         return f"the run of '{config.name}' by {self.method}{again}"
 
     def require_finite(self, name: str) -> None:

@@ -89,7 +89,8 @@ class SceneConfig(ConfigModel):
         if not groups:
             raise ValueError("effects list no constraint group: there is nothing to project")
         if len(set(groups)) < len(groups):
-            added = "; young with poisson adds volume or area"
+            doubled = {group for group in groups if groups.count(group) > 1} & {"volume", "area"}
+            added = "; young with poisson adds volume or area" if doubled else ""
             raise ValueError(f"effects list a constraint group twice: {', '.join(groups)}{added}")
         for effect in self.effects:
             effect.check_step(self.time_step)
