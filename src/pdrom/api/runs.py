@@ -173,7 +173,8 @@ def _warn_unless_converged(scene: Scene, loop: Stepper) -> None:
         log.warning(
             "%s: frames are not converged%s: the estimated error of frame %d is %.2g of its motion "
             "(allowed %g); tried on it: %s; --check estimates the error of the run",
-            scene.config.name, after, worst[1], worst[0], limit, remedy(scene, worst[2], worst[1]),
+            scene.config.name, after, worst[1], worst[0], limit,
+            remedy(scene, worst[2], worst[1], limit),
         )  # fmt: skip
 
 

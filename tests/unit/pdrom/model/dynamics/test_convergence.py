@@ -45,7 +45,20 @@ def test_a_stiff_run_names_a_remedy_that_is_true_and_a_soft_one_is_silent(caplog
     loop.step(state, 10)
     assert loop.errors[10] < 0.03
     monkeypatch.setattr("pdrom.model.runs.TRIED", (2, 3))
-    assert "3 accelerated iterations do not bring it within 1%" in remedy(scene, state, 10)
+    assert "3 accelerated iterations do not bring it within 1%" in remedy(scene, state, 10, 0.05)
+
+
+def test_trials_of_a_remedy_are_announced_meet_a_smaller_error_and_are_few_on_large_meshes(
+    caplog, monkeypatch
+):
+    caplog.set_level("INFO")
+    scene = scene_of(BAR, 1e7)
+    start = scene.initial_state()
+    counts = [int(re.findall(r"\d+", remedy(scene, start, 0, e))[0]) for e in (0.5, 1e-3)]
+    assert counts[0] < counts[1]
+    assert "trying how many iterations frame 0 needs" in caplog.text
+    monkeypatch.setattr("pdrom.model.runs.WORK", 25 * scene.mesh.vertices)
+    assert "20 accelerated iterations do not bring it within 0.1%" in remedy(scene, start, 0, 1e-3)
 
 
 @PLAIN_AND_ANDERSON
