@@ -11,9 +11,9 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 35_700,
-    "lines of tests": 22_900,
-    "words of documentation": 25_400,
+    "lines of src": 36_100,
+    "lines of tests": 23_100,
+    "words of documentation": 25_700,
     "tables": 27,
     "figures": 23,
     "experiments": 20,

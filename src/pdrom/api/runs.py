@@ -110,7 +110,8 @@ def run(
             run_full_order(scene, path, later, True, on_frame, begun, method, loop)
         if compiled.done:
             log.info("%s: kernels compiled in %.1f s", scene.config.name, compiled.duration)
-        _warn_unless_converged(scene, loop)
+        if estimate:
+            _warn_unless_converged(scene, loop)
         with open_hdf5(path) as file:
             return stored_run(scene, file)
 
@@ -125,14 +126,10 @@ def _begun(
         return [], None
     own, h = files.require_run(start, "start").scene, scene.config.time_step
     for key in ("points", "triangles", "tetrahedra", "time_step"):
-        had, needed = (
-            getattr(s.config if key == "time_step" else s.mesh, key) for s in (own, scene)
-        )
-        if not np.array_equal(had, needed):
-            sizes = " for ".join(str(np.shape(each) or each) for each in (had, needed))
-            raise ConfigurationError(
-                f"start: {start.title} has other {key} ({sizes}) than the scene"
-            )
+        had, has = (getattr(s.config if key == "time_step" else s.mesh, key) for s in (own, scene))
+        if not np.array_equal(had, has):
+            sizes = f"{key} ({np.shape(had) or had} for {np.shape(has) or has})"
+            raise ConfigurationError(f"start: {start.title} has other {sizes} than the scene")
     n, frames = len(start.ms) if frame is None else frame, scene.config.frames
     last = min(len(start.ms), frames - 1)
     if not isinstance(n, (int, np.integer)) or not 1 <= n <= last:
@@ -154,8 +151,7 @@ def _begun(
         if first.config not in [each.config for each in own.starts]:
             fault = f"effect '{first.name}' acts at frame 0 only, where start has none like it"
             raise ConfigurationError(f"{fault}: leave it out of a scene that goes on")
-    anchors = tuple(kept)
-    unknown, part = np.full(1, np.nan), 1e-3 / len(PHASES)  # the phases' times are not told apart
+    anchors, unknown, part = tuple(kept), np.full(1, np.nan), 1e-3 / len(PHASES)  # of each phase
     begun = [
         (State(after, (after - before) / h, anchors), FrameReport(unknown, np.full(4, part * ms)))
         for before, after, ms in zip(q, q[1:], start.ms, strict=False)

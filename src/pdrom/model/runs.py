@@ -122,14 +122,17 @@ def remedy(scene: Scene, state: State, frame: int, allowed: float) -> str:
     If ``allowed`` is less, within that, but not below 0.01 %; large meshes have fewer trials.
     """
     start, window = state.positions, scene.config.anderson_window or WINDOW
-    near, limit = max(1e-4, min(NEAR, allowed)), max(TRIED[0], WORK // scene.mesh.vertices)
+    near, most = max(1e-4, min(NEAR, allowed)), max(TRIED[0], WORK // scene.mesh.vertices)
     log.info("%s: trying how many iterations frame %d needs", scene.config.name, frame)
-    best = ConvergedStepper(scene, scene.system, 1e-11, min(limit, 10_000)).step(state, frame)[0]
-    tried, within = [count for count in TRIED if count <= limit], f"within {100 * near:.3g}%"
+    minimiser = ConvergedStepper(scene, scene.system, 1e-9, min(most, 10_000))
+    best, extent = minimiser.step(state, frame)[0].positions, scene.mesh.extent
+    if not minimiser.converged:
+        return f"{minimiser.iterations:,} evaluations of a minimiser do not converge it"
+    tried, within = [count for count in TRIED if count <= most], f"within {100 * near:.3g}%"
     for count in tried:
         loop = scene.iterated(count, window).stepper(track_objective=False)
-        found, extent = loop.step(state, frame)[0].positions, scene.mesh.extent
-        if frame_error(found, best.positions, start, scene.masses, extent) <= near:
+        found = loop.step(state, frame)[0].positions
+        if frame_error(found, best, start, scene.masses, extent) <= near:
             return f"iterations: {count} with anderson_window: {window} bring it {within}"
     return f"{tried[-1]:,} accelerated iterations do not bring it {within}"
 

@@ -6,8 +6,7 @@ costs : `config/reference/job_costs.csv` from the logs of the full and of the ti
     kind of job, the mean processor seconds in both, and the longest time and largest memory, which
     the requests of `workflow/profiles/slurm` must cover
 frozen : the fingerprint of the code, the rules and the scenes of ``config/replication.yaml``
-replication : the recorded verdicts of ``config/replication.yaml``; refused if its fingerprint is
-    not the frozen one
+replication : the recorded verdicts of ``config/replication.yaml``, if that is as it was frozen
 rows : tables of ``config/extended.yaml`` that other studies show, too; makes them first
 """
 
@@ -90,26 +89,22 @@ def code_of_replication() -> str:
     return f"{fingerprint(*plan()[0])[:16]} {digest(Path(), *files)}"
 
 
-def replicated(claims: Path) -> dict[Path, pd.DataFrame]:
+def replicated(claims: Path | None) -> dict[Path, pd.DataFrame]:
     """Map the files of the last replication to their content, with the verdicts in ``claims``.
 
-    Raises ConfigurationError if code, rules or scenes have changed since they were frozen.
+    Without ``claims`` it is frozen. Raises ConfigurationError if code, rules or scenes changed.
     """
     commits, code = pd.read_csv(COMMITS, dtype=str), code_of_replication()
-    *_, name = commits.replication
-    if (kept := commits.code_frozen.iloc[-1]) != code:
+    last, name = commits.index[-1], commits.replication.iloc[-1]
+    if claims is None:
+        commits.loc[last, "code_frozen"] = code
+        return {Path(COMMITS): commits}
+    if (kept := commits.code_frozen[last]) != code:
         raise ConfigurationError(f"{COMMITS}: {name}: frozen is '{kept}', which now is '{code}'")
-    commits.loc[commits.index[-1], "code_recorded"] = code
+    commits.loc[last, "code_recorded"] = code
     earlier = pd.read_csv(RECORDED, dtype=str).query("replication != @name")
     verdicts = recorded_verdicts(claims, Path(RULES)).assign(replication=name)
     return {Path(RECORDED): pd.concat([earlier, verdicts]), Path(COMMITS): commits}
-
-
-def frozen() -> pd.DataFrame:
-    """Return the table `COMMITS` with the present fingerprint for its last replication."""
-    commits = pd.read_csv(COMMITS, dtype=str)
-    commits.loc[commits.index[-1], "code_frozen"] = code_of_replication()
-    return commits
 
 
 def dated(path: Path, column: str) -> pd.DataFrame:
@@ -145,7 +140,7 @@ def updated(word: str) -> dict[Path, pd.DataFrame]:
         case "replication":
             return replicated(Path(TABLE.at(replication, name="claims")))
         case "frozen":
-            return {Path(COMMITS): frozen()}
+            return replicated(None)
         case "rows":
             tables = {n: dated(Path(TABLE.at(extended, name=n)), "recorded") for n in KEPT}
             used = map(usage_of, Path(extended, "logs", alternatives.name).rglob("*.log"))

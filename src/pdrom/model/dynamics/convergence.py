@@ -14,6 +14,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError
 
 from pdrom.core.yamlfile import ConfigModel, describe
+from pdrom.model.compiled.dots import dot
+from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH, flat
 from pdrom.model.dynamics.stepper import Observer, State, Stepper
 
@@ -39,6 +41,23 @@ def _until(entry: Any) -> Any:
 Iterations = Annotated[Annotated[int, Field(ge=1, le=10_000)] | Until, BeforeValidator(_until)]
 
 
+@compiled(nogil=True)
+def add_direction(basis, slopes, j, image, reached, own, ahead):
+    """Add row j + 1 to ``basis``, column j to ``slopes``; move ``image`` from G along that row."""
+    new = basis[j + 1]
+    for i in range(len(new)):
+        new[i] = (image[i] - reached[i]) / ahead[i]
+    for k in range(j + 1):
+        part = slopes[k, j] = dot(basis[k], new)
+        for i in range(len(new)):
+            new[i] -= part * basis[k, i]
+    length = slopes[j + 1, j] = np.sqrt(dot(new, new))
+    scale = 1.0 / length if length else 0.0
+    for i in range(len(new)):
+        new[i] *= scale
+        image[i] = own[i] + ahead[i] * new[i]
+
+
 def frame_error(y: Any, converged: Any, before: Any, masses: np.ndarray, extent: float) -> float:
     """Error of a frame from positions ``before`` to ``y``; all are (N, 3) m, ``masses`` (N,)."""
     root = np.sqrt(masses / masses.sum())[:, None]
@@ -58,7 +77,8 @@ class EstimatingStepper(Stepper):
         self._until, self._extent, self._first = until, extent, min(BEGIN, frames - 1)
         inertia = self.space.system.inertia  # type: ignore[attr-defined]
         self._scale = np.repeat(np.sqrt(inertia / inertia.sum()), WIDTH)
-        self._directions = max(1, min(DIRECTIONS, 6 * self.iterations // 5 - 1))
+        self._directions = max(1, min(DIRECTIONS, 4 * self.iterations // 5))
+        self._basis = np.zeros((self._directions + 1, len(self._scale)))
         self.errors: dict[int, float] = {}
         self.worst: tuple[float, int, State] | None = None
 
@@ -104,21 +124,17 @@ class EstimatingStepper(Stepper):
         """Estimated error of a ``frame`` (s, base, system) with the last iterate ``y``."""
         own, trial, count = flat(y), self.space.copy(y), self._directions
         image, ahead = flat(trial), STEP * self._extent / self._scale
-        basis, slopes = np.zeros((count + 1, len(own))), np.zeros((count + 1, count))
+        basis, slopes = self._basis, np.zeros((count + 1, count))
         with np.errstate(all="ignore"):  # a run that blew up has no estimate
             self._advance(1, trial, *frame)
             reached = image.copy()
             residual = self._scale * (reached - own)
-            first = np.sqrt(np.einsum("i,i", residual, residual))  # BLAS would start threads
+            first = np.sqrt(dot(residual, residual))
             basis[0] = residual / (first or 1.0)
+            image[:] = own + ahead * basis[0]
             for j in range(count):
-                image[:] = own + ahead * basis[j]
                 self._advance(1, trial, *frame)
-                new = (image - reached) / ahead
-                slopes[: j + 1, j] = parts = np.einsum("ij,j", basis[: j + 1], new)
-                new -= np.einsum("i,ij", parts, basis[: j + 1])
-                slopes[j + 1, j] = length = np.sqrt(np.einsum("i,i", new, new))
-                basis[j + 1] = new / (length or 1.0)
+                add_direction(basis, slopes, j, image, reached, own, ahead)
             moved = np.linalg.norm(self._scale * (own - self._start))
         with suppress(np.linalg.LinAlgError):
             found = np.linalg.solve(np.eye(count) - slopes[:count], first * np.eye(count)[0])

@@ -432,10 +432,7 @@ def _kept(
     timed_cells=timed_parts("verdict", "decidable", "same", "measured"),
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path, commits: Path) -> pd.DataFrame:
-    """Verdicts of ``claims`` beside ``recorded`` ones; a row per replication, claim and part.
-
-    ``commits`` is a file with the hashes of commits for each replication.
-    """
+    """Verdicts of ``claims`` beside ``recorded`` ones; a row per replication, claim and part."""
     others = pd.read_csv(recorded).merge(pd.read_csv(commits, dtype=str), on="replication")
     both = others.merge(claims, on="claim", suffixes=("_replication", ""))
     fingerprints = {claim: rule.fingerprint for claim, rule in load_claims(rules).items()}

@@ -10,14 +10,6 @@ from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from study.pipeline.progress import rounded
 
 
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [(5, "less than a minute"), (80, "1.5 min"), (540, "9 min"), (7200, "2.0 h")],
-)
-def test_durations_are_rounded(seconds, words):
-    assert rounded(seconds).removeprefix("about ") == words
-
-
 @pytest.fixture
 def emit(capsys):
     """Send records to the plugin, as ``--logger pdrom`` sets it up; return the lines it prints."""
@@ -36,10 +28,6 @@ def emit(capsys):
 
 JOB = {"event": LogEvent.JOB_INFO, "rule_name": "fom", "rule_msg": None, "created": 30.0}
 DONE = {"event": LogEvent.JOB_FINISHED}
-
-
-def test_no_job_of_a_dry_run_has_a_line(emit):
-    assert emit(JOB, dryrun=True) == []
 
 
 def test_jobs_have_counts_and_after_a_twentieth_of_the_work_its_share_and_the_time_left(emit):

@@ -15,9 +15,9 @@ from pdrom.core.yamlfile import read_yaml
 from places import ROOT
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
-from study.pipeline.progress import Preview, shortened
+from study.pipeline.progress import Preview
 from study.pipeline.study import Study
-from study.pipeline.summary import minutes, processor_seconds, summary
+from study.pipeline.summary import processor_seconds, summary
 
 FIGURES = ("results/figures/a.pdf", "results/figures/b.pdf")
 TABLES = ("results/tables/claims.csv",)
@@ -66,10 +66,6 @@ def test_a_whole_study_names_its_configuration_verdicts_and_results():
     assert not [word for word in lines() if word.startswith("verdicts")]
 
 
-def test_durations_have_minutes_and_seconds():
-    assert (minutes(59.4), minutes(60), minutes(125)) == ("59 s", "1 min 0 s", "2 min 5 s")
-
-
 def test_a_study_says_how_it_differs_from_the_full_one():
     default = read_yaml(ROOT / "config" / "default.yaml")
     short = {"coarsen": {"resolution": 0.4, "frames": 0.5}}
@@ -78,33 +74,11 @@ def test_a_study_says_how_it_differs_from_the_full_one():
     assert "coarse meshes and short runs" in said[1]
 
 
-def test_single_files_are_named():
-    said = lines("--configfile", "my.yaml", "--", "results/x", "results/y")
-    assert list(said) == ["configuration", "made", "time"]
-    assert said["made"] == "results/x, results/y"
-
-
 def test_processor_time_counts_what_this_process_waited_for():
     work = "import time\nwhile time.process_time() < 0.3: pass"
     before = processor_seconds()
     subprocess.run([sys.executable, "-c", work], check=True)
     assert processor_seconds() - before >= 0.2
-
-
-@pytest.mark.parametrize(
-    ("reason", "words"),
-    [
-        ("Missing output files: a.h5; Input files updated by another job: b.h5",
-         {"output is missing"}),
-        ("Input files updated by another job: a.h5, b.h5", {"input is made again"}),
-        ("Updated input files: a.yaml; Code has changed since last execution; Params have changed "
-         "since last execution: {}",
-         {"input is newer", "script has changed", "settings or code have changed"}),
-        ("Rules with neither input nor output files are always executed.", set()),
-    ],
-)  # fmt: skip
-def test_reasons_are_told_without_the_files(reason, words):
-    assert shortened(reason) == words
 
 
 def job(rule, reason, *logs, threads=1):

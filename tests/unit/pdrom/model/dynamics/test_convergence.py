@@ -58,7 +58,7 @@ def test_trials_of_a_remedy_are_announced_meet_a_smaller_error_and_are_few_on_la
     assert counts[0] < counts[1]
     assert "trying how many iterations frame 0 needs" in caplog.text
     monkeypatch.setattr("pdrom.model.runs.WORK", 25 * scene.mesh.vertices)
-    assert "20 accelerated iterations do not bring it within 0.1%" in remedy(scene, start, 0, 1e-3)
+    assert "25 evaluations of a minimiser do not converge it" in remedy(scene, start, 0, 1e-3)
 
 
 @PLAIN_AND_ANDERSON
