@@ -7,7 +7,7 @@ import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
 
 from study.artifact.logs import job_log
-from study.pipeline.failures import Failures, cause, plain
+from study.pipeline.failures import Failures
 from study.pipeline.signals import ENDINGS
 
 ENDED = "CalledProcessError in file x, line 3:\nCommand 'python x.py' "
@@ -19,23 +19,6 @@ def fail(failures, rule, log, said, indent=False):
     job = {"event": LogEvent.JOB_ERROR, "rule_name": rule, "rule_msg": None, "indent": indent}
     for record in (error, job | {"log": [str(log)], "output": ["results/x.h5"]}):
         failures.emit(logging.makeLogRecord(record))
-
-
-@pytest.mark.parametrize(
-    ("said", "parts"),
-    [
-        (ENDED + "died with <Signals.SIGKILL: 9>.", ["SIGKILL", "out of memory?"]),
-        (ENDED + "returned non-zero exit status 137.", ["SIGKILL", "out of memory?"]),
-        (ENDED + "returned non-zero exit status 139.", ["SIGSEGV"]),
-        (ENDED + "returned non-zero exit status 3.", ["exit status 3"]),
-        (ENDED + "exit status 69.", ["out of memory?"]),
-        ("OSError: [Errno 28] No space left on device: 'x'", ["No space left on device: 'x'"]),
-        ("SLURM-job '3' failed, SLURM status is: 'TIMEOUT'. x", ["TIMEOUT"]),
-        ("", ["without an error message"]),
-    ],
-)
-def test_a_cause_names_the_signal_the_status_or_what_snakemake_says(said, parts):
-    assert [part for part in parts if part not in cause(said)] == []
 
 
 def test_each_failed_job_is_named_with_its_error_or_cause(tmp_path):
@@ -80,13 +63,3 @@ def test_a_run_that_a_signal_ended_names_no_failed_job(number):
     assert status == 128 + number
     assert text.startswith(f"pdrom: {ENDINGS[number]}; ")
     assert text.count("\n") == 1
-
-
-def test_an_error_outside_of_jobs_is_one_line():
-    record = logging.makeLogRecord({"event": LogEvent.ERROR, "msg": "Traceback\ntwo\nlines"})
-    try:
-        raise ValueError("two\nlines")
-    except ValueError:
-        plain(record)
-    assert record.msg.startswith("pdrom: ValueError: two lines")
-    assert "\n" not in record.msg

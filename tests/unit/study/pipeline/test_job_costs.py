@@ -144,13 +144,10 @@ def record(tmp_path: Path) -> Path:
         (tmp_path / "config" / name.name).symlink_to(name)
     write_table(claims.checked(verdicts()), tmp_path / "claims.csv")
     recorded = recorded_verdicts(tmp_path / "claims.csv", ROOT / RULES).assign(replication="first")
-    folder = (tmp_path / RECORDED).parent
-    folder.mkdir()
+    (folder := (tmp_path / RECORDED).parent).mkdir()
     recorded.to_csv(folder / "claims.csv", index=False)
-    commits = pd.DataFrame({"replication": ["first", "second"], "frozen": ["aa", "bb"]})
-    commits.reindex(columns=[*commits, "recorded", "code_frozen", "code_recorded"]).to_csv(
-        folder / "commits.csv", index=False
-    )
+    lines = "replication,frozen,recorded,code_frozen,code_recorded", "first,aa,,,", "second,bb,,,"
+    (folder / "commits.csv").write_text("\n".join(lines))
     return folder
 
 
@@ -167,7 +164,9 @@ def test_another_verdict_is_not_the_same_and_none_is_not_counted(record: Path) -
     assert table.frozen.tolist() == ["aa"] * 4
 
 
-@pytest.mark.parametrize("change", ["code", "scene"])
+@pytest.mark.parametrize(
+    "change", [("fingerprint", lambda *_: "changed"), ("OTHERS", "config/tiny.yaml")]
+)
 def test_a_record_is_refused_if_code_or_a_scene_changed_since_it_was_frozen(
     record, tmp_path, monkeypatch, change
 ):
@@ -176,10 +175,7 @@ def test_a_record_is_refused_if_code_or_a_scene_changed_since_it_was_frozen(
     made = tracked.replicated(tmp_path / "claims.csv")
     assert made[Path(RECORDED)].replication.tolist() == 2 * ["first"] + 2 * ["second"]
     assert made[Path(COMMITS)].iloc[-1, -1] == made[Path(COMMITS)].iloc[-1, -2]
-    if change == "code":
-        monkeypatch.setattr(tracked, "fingerprint", lambda *modules: "changed")
-    else:
-        monkeypatch.setattr(tracked, "OTHERS", "config/tiny.yaml")
+    monkeypatch.setattr(tracked, *change)
     with pytest.raises(ConfigurationError, match=r"csv: second: frozen is '\w{16} \w{16}'"):
         tracked.replicated(tmp_path / "claims.csv")
 

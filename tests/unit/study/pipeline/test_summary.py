@@ -11,12 +11,9 @@ import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
 
 from pdrom.core.store import write_table
-from pdrom.core.yamlfile import read_yaml
-from places import ROOT
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
 from study.pipeline.progress import Preview
-from study.pipeline.study import Study
 from study.pipeline.summary import processor_seconds, summary
 
 FIGURES = ("results/figures/a.pdf", "results/figures/b.pdf")
@@ -64,14 +61,6 @@ def test_a_whole_study_names_its_configuration_verdicts_and_results():
         assert part in said[key]
     Path(TABLES[0]).unlink()  # without verdicts the rest is said
     assert not [word for word in lines() if word.startswith("verdicts")]
-
-
-def test_a_study_says_how_it_differs_from_the_full_one():
-    default = read_yaml(ROOT / "config" / "default.yaml")
-    short = {"coarsen": {"resolution": 0.4, "frames": 0.5}}
-    said = [Study({**default, **changes}, ROOT).apart for changes in ({}, short, {"ranks": [3]})]
-    assert [bool(words) for words in said] == [False, True, True]
-    assert "coarse meshes and short runs" in said[1]
 
 
 def test_processor_time_counts_what_this_process_waited_for():
