@@ -15,7 +15,7 @@ from study.experiments.alternatives import experiment
 from study.experiments.alternatives.experiment import Alternatives, Comparison
 from study.tables import declared
 from study.tables.alternatives import alternatives
-from study.tables.kit.results import with_recorded
+from study.tables.kit.results import DAY, with_recorded
 
 EFFECTS = (GRAVITY, LEFT, {"effect": "spring", "weight": 1e4})
 STEPS = {
@@ -115,7 +115,7 @@ def test_a_finer_mesh_has_the_mass_of_the_scene():
     assert [getattr(effect, "weight", None) for effect in finer.effects] == [None, None, 1e5]
 
 
-@pytest.mark.parametrize("name", [n for n, t in declared().items() if "recorded" in t.column_names])
+@pytest.mark.parametrize("name", [n for n, t in declared().items() if DAY in t.columns])
 def test_a_table_has_no_times_of_two_machines(name, tmp_path):
     columns = declared()[name].columns
     times = [c.name for c in columns if c.timed and c.unit in ("ms", "s")]
