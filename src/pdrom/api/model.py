@@ -47,7 +47,7 @@ def silent(frame: int, report: FrameReport) -> None:
 
 @dataclass(frozen=True)
 class Training:
-    """How a model was trained.
+    """Training of a model: its settings and cost.
 
     trajectories : names of the training trajectories
     converged : whether their frames were solved to convergence

@@ -117,7 +117,7 @@ def converged_run(
 
 
 def remedy(scene: Scene, state: State, frame: int, allowed: float) -> str:
-    """Try how many accelerated iterations bring ``frame`` from ``state`` within 1 %; say it.
+    """Return how many accelerated iterations bring ``frame`` from ``state`` within 1 %, in words.
 
     If ``allowed`` is less, within that, but not below 0.01 %; large meshes have fewer trials.
     """

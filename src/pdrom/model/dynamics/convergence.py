@@ -59,7 +59,7 @@ def add_direction(basis, slopes, j, image, reached, own, ahead):
 
 
 def frame_error(y: Any, converged: Any, before: Any, masses: np.ndarray, extent: float) -> float:
-    """Error of a frame from positions ``before`` to ``y``; all are (N, 3) m, ``masses`` (N,)."""
+    """Error of a frame, from ``before`` to ``y``; (N, 3) and ``extent`` m, ``masses`` (N,) kg."""
     root = np.sqrt(masses / masses.sum())[:, None]
     far, moved = (float(np.linalg.norm(root * (y - other))) for other in (converged, before))
     return far / max(moved, REST * extent)
@@ -69,7 +69,8 @@ class EstimatingStepper(Stepper):
     """Full-order step loop that estimates the error of every 20th frame; nothing else changes.
 
     With ``until``, a frame has 10, 20, 40, ... or all iterations, until its estimate suffices.
-    ``errors`` maps frames to errors; ``worst`` is the largest, its frame and the state before it.
+    ``extent`` (m) is the mesh's longest side; other arguments are those of `Stepper`. ``errors``
+    maps frames to errors; ``worst`` is the largest, its frame and the state before it.
     """
 
     def __init__(self, until: Until | None, extent: float, frames: int, *a: Any, **k: Any) -> None:
