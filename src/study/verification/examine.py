@@ -14,24 +14,24 @@ from study.artifact.paths import TABLE
 from study.pipeline.plan import Job
 from study.pipeline.unfit import UNUSUAL, faults
 from study.tables import declared
-from study.tables.claims.claims import RULES
+from study.tables.claims.claims import RULES, timed_columns
 from study.tables.claims.rules import load_claims
 from study.verification import compare
 from study.verification.files import differing, is_derived
 from study.verification.references import Reference, folder_of, read_references
 from study.verification.subject import Subject
 
-# Verdict column of table claims -> field of `ClaimRule` with its tests, its name in messages.
-PARTS = {"verdict": ("published", "as published"), "verdict_beyond": ("beyond", "beyond")}
+# Columns of the table claims with verdicts, and their names in messages.
+VERDICTS = {"verdict": "as published", "verdict_beyond": "beyond"}
 
 
 class Outcome(StrEnum):
-    """Result of comparing a claim, figure or table of a run with the expected one in git."""
+    """Result of comparing a claim, figure or table with the expected one, the best first."""
 
     REPRODUCED = "reproduced"
-    DIFFERS = "differs"
     NOT_COMPARABLE = "not comparable on this machine"
     NO_REFERENCE = "no reference"
+    DIFFERS = "differs"
     MISSING = "not there"
 
 
@@ -93,9 +93,10 @@ class Examination:
         path, table = TABLE.at(self.subject.results, name=name), declared()[name]
         if missing := self._missing(name, [path]):
             raise StorageError(missing)
-        if other := sorted(set(read_table(path).columns) - set(table.column_names)):
+        frame = read_table(path, table.column_names)
+        if other := sorted(set(frame) - set(table.column_names)):
             raise StorageError(f"{path}: has the unknown column(s) {', '.join(other)}")
-        return table.checked(read_table(path, table.column_names))
+        return table.checked(frame)
 
     @cached_property
     def expected(self) -> dict[str, Reference]:
@@ -131,10 +132,8 @@ class Examination:
             return line(Outcome.DIFFERS, "it is not what the tables at hand give")
         reference, columns = self.expected[name], compare.kept(table)
         known = frame.assign(**dict.fromkeys(set(frame) - set(reference.columns)))
-        differences, compared = compare.judge(
-            compare.Comparison(table, reference.frame, table.checked(known), self.context)
-        )
-        if differences:
+        found = compare.Comparison(table, reference.frame, table.checked(known), self.context)
+        if differences := found.messages():
             more = f" and {len(differences) - 1} more" if differences[1:] else ""
             return line(Outcome.DIFFERS, differences[0] + more, tuple(differences))
         if new := [column.name for column in columns if column.name not in reference.columns]:
@@ -142,7 +141,7 @@ class Examination:
         if all(map(compare.identifies, columns)):
             text = "its numbers are times or round-off; names and sizes agree"
             return line(Outcome.NOT_COMPARABLE, text)
-        return line(Outcome.REPRODUCED, compared)
+        return line(Outcome.REPRODUCED, f"{len(frame)} rows")
 
     def claims(self, table: Line) -> list[Line]:
         """Outcome of each claim; that of ``table``, the table of claims, if this is unusable."""
@@ -180,15 +179,17 @@ def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
     if name not in expected.index or name not in found.index:
         text = "the claim is new" if name in found.index else "the claim is gone"
         return Line("claim", name, Outcome.DIFFERS, text)
-    same, changed, outcomes = [], [], set()
-    for column, (part, words) in PARTS.items():
+    rule = load_claims(Path(RULES)).get(name)
+    timed = timed_columns(rule) if rule else set()
+    texts, outcomes = [], [Outcome.REPRODUCED]
+    for column, words in VERDICTS.items():
         a, b = str(expected.loc[name, column]), str(found.loc[name, column])
         if a == b:
-            same.append(f"{words}: {b}")
-            continue
-        tests = getattr(load_claims(Path(RULES)).get(name), part, ())
-        timed = any(test.decides and test.timed for test in tests)
-        changed.append(f"{words}: expected '{a}', found '{b}'" + timed * ", which rests on times")
-        outcomes.add(Outcome.NOT_COMPARABLE if timed else Outcome.DIFFERS)
-    worst = max(outcomes, key=lambda o: o is Outcome.DIFFERS, default=Outcome.REPRODUCED)
-    return Line("claim", name, worst, "; ".join(changed or same))
+            texts.append(f"{words}: {b}")
+        elif column in timed:
+            texts.append(f"{words}: expected '{a}', found '{b}', which rests on times")
+            outcomes.append(Outcome.NOT_COMPARABLE)
+        else:
+            texts.append(f"{words}: expected '{a}', found '{b}'")
+            outcomes.append(Outcome.DIFFERS)
+    return Line("claim", name, max(outcomes, key=[*Outcome].index), "; ".join(texts))

@@ -272,8 +272,8 @@ def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
 
 
 def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
-    test = next(test for test in getattr(rule, row.part) if test.what == row.what)
-    return {*FOUND} if test.timed else set()
+    timed = any(test.timed for test in getattr(rule, row.part) if test.what == row.what)
+    return {*FOUND} if timed else set()
 
 
 @table(
