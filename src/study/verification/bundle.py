@@ -21,7 +21,7 @@ from study.pipeline.manifest import read_manifest
 from study.verification.files import verify_files
 from study.verification.subject import Status, Subject, options_parser, say
 
-NAME = f"pdrom-{__version__}"
+ARCHIVE = f"pdrom-{__version__}"
 
 
 def bundle(arguments: Sequence[str]) -> Status:
@@ -35,7 +35,7 @@ def bundle(arguments: Sequence[str]) -> Status:
     names = [*read_manifest(subject.results).files, paths.MANIFEST.pattern]
     small = {n: folder / n for n in names if not n.endswith(".h5")}  # no HDF5: a run makes it again
     results = {os.path.normpath(f"published/results/{name}"): p for name, p in small.items()}
-    target = folder / f"{NAME}.tar.gz"
+    target = folder / f"{ARCHIVE}.tar.gz"
     write_archive(Path(), results, target)
     say(f"{target}: {target.stat().st_size / 1e6:.1f} MB")
     return Status.HOLDS
@@ -50,10 +50,10 @@ def write_archive(root: Path, results: Mapping[str, Path], target: Path) -> None
     if changed := _git(root, "status", "--porcelain", "--untracked-files=no").decode():
         names = ", ".join(line[3:] for line in changed.splitlines())
         raise ConfigurationError(f"bundle: changes that are in no commit: {names}; commit them")
-    made = io.BytesIO(_git(root, "archive", f"--prefix={NAME}/", "HEAD"))
+    made = io.BytesIO(_git(root, "archive", f"--prefix={ARCHIVE}/", "HEAD"))
     with tarfile.open(fileobj=made, mode="a") as archive:
         for name, path in sorted(results.items()):
-            entry = tarfile.TarInfo(f"{NAME}/{name}")
+            entry = tarfile.TarInfo(f"{ARCHIVE}/{name}")
             entry.size, entry.mtime = path.stat().st_size, date
             with open(path, "rb") as content:
                 archive.addfile(entry, content)

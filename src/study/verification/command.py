@@ -20,10 +20,10 @@ from study.verification.files import verify_files
 from study.verification.references import LOG, folder_of, note, write_reference
 from study.verification.subject import Status, Subject, options_parser, say
 
-CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
+EXIT_CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
 PAGE = "verification.md"
 # Largest number of differences that the file `PAGE` lists for one table, figure or claim.
-ON_PAGE = 20
+DIFFERENCES_SHOWN = 20
 
 
 def update(subject: Subject, reason: str) -> Path:
@@ -51,7 +51,9 @@ def update(subject: Subject, reason: str) -> Path:
 
 
 def parser() -> argparse.ArgumentParser:
-    made = options_parser("verify", "Compare the last run's results with the expected ones.", CODES)
+    made = options_parser(
+        "verify", "Compare the last run's results with the expected ones.", EXIT_CODES
+    )
     what = made.add_mutually_exclusive_group()
     what.add_argument("--files", action="store_true", help="check that no file has changed")
     what.add_argument("--update", action="store_true", help="expect the results of the last run")
@@ -96,9 +98,9 @@ def verify_tables(subject: Subject) -> Status:
 
 def status_of(lines: Iterable[Line]) -> Status:
     """Return `MISSING` if a result is missing, `DIFFERS` if one differs or is new, else `HOLDS`."""
-    outcomes = {line.outcome for line in lines}
-    other = Status.HOLDS if outcomes <= {*GOOD, Outcome.MISSING} else Status.DIFFERS
-    return Status.MISSING if Outcome.MISSING in outcomes else other
+    worst = max((line.outcome for line in lines), key=[*Outcome].index)
+    bad = Status.MISSING if worst is Outcome.MISSING else Status.DIFFERS
+    return Status.HOLDS if worst in GOOD else bad
 
 
 def counted(lines: Sequence[Line]) -> str:
@@ -115,8 +117,8 @@ def page(lines: Sequence[Line], about: str) -> str:
     """Return a Markdown page: the sentence ``about``, and all ``lines`` with their differences."""
     parts = [f"# Verification\n\n{about}\nSee `docs/verification.md`.\n\n{counted(lines)}.\n"]
     for line in lines:
-        more = len(line.details) - ON_PAGE
-        parts += [f"- {line}", *(f"  - {text}" for text in line.details[:ON_PAGE])]
+        more = len(line.details) - DIFFERENCES_SHOWN
+        parts += [f"- {line}", *(f"  - {text}" for text in line.details[:DIFFERENCES_SHOWN])]
         parts += [f"  - and {more} more"] if more > 0 else []
     return "\n".join([*parts, ""])
 

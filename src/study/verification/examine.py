@@ -181,15 +181,11 @@ def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
         return Line("claim", name, Outcome.DIFFERS, text)
     rule = load_claims(Path(RULES)).get(name)
     timed = timed_columns(rule) if rule else set()
-    texts, outcomes = [], [Outcome.REPRODUCED]
+    texts, outcomes = [], []
     for column, words in VERDICTS.items():
         a, b = str(expected.loc[name, column]), str(found.loc[name, column])
-        if a == b:
-            texts.append(f"{words}: {b}")
-        elif column in timed:
-            texts.append(f"{words}: expected '{a}', found '{b}', which rests on times")
-            outcomes.append(Outcome.NOT_COMPARABLE)
-        else:
-            texts.append(f"{words}: expected '{a}', found '{b}'")
-            outcomes.append(Outcome.DIFFERS)
+        changed = f"expected '{a}', found '{b}'" + ", which rests on times" * (column in timed)
+        texts.append(f"{words}: {b if a == b else changed}")
+        bad = Outcome.NOT_COMPARABLE if column in timed else Outcome.DIFFERS
+        outcomes.append(Outcome.REPRODUCED if a == b else bad)
     return Line("claim", name, max(outcomes, key=[*Outcome].index), "; ".join(texts))

@@ -21,14 +21,14 @@ from study.tables import declared
 from study.verification.subject import Status, Subject, say
 
 DAMAGED = "damaged (its checksum differs)"
-LOST = "not there"
-OTHER = "not what its inputs give"
-FOREIGN = "no file of this study"
-UNLISTED = "not in the manifest"
+NOT_THERE = "not there"
+REPLACED = "not what its inputs give"
+NOT_OURS = "no file of this study"
+NOT_LISTED = "not in the manifest"
 # Largest number of faults that are printed one by one.
-SHOWN = 20
+FAULTS_SHOWN = 20
 # Types of errors that a job may raise if somebody edited its input tables.
-FAULTS = (PdromError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+JOB_ERRORS = (PdromError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 
 def verify_files(subject: Subject) -> Status:
@@ -51,17 +51,17 @@ def verify_files(subject: Subject) -> Status:
     for job in chain.from_iterable(subject.plan.fixed.values()):
         if set(faults).isdisjoint((*job.files, *job.outputs.values())):
             other += differing(job)
-    faults |= dict.fromkeys(other, OTHER)
+    faults |= dict.fromkeys(other, REPLACED)
     checked = Checked(subject.results)
-    checked.distrust(path for path, fault in faults.items() if fault in (DAMAGED, OTHER))
+    checked.distrust(path for path, fault in faults.items() if fault in (DAMAGED, REPLACED))
     checked.save()
-    for path, fault in list(faults.items())[:SHOWN]:
-        say(f"{path}: {fault}" + ("" if fault == FOREIGN else f"; run {subject.command()}"))
-    if len(faults) > SHOWN:
-        say(f"and {len(faults) - SHOWN} more; finish the study by {subject.command()}")
+    for path, fault in list(faults.items())[:FAULTS_SHOWN]:
+        say(f"{path}: {fault}" + ("" if fault == NOT_OURS else f"; run {subject.command()}"))
+    if len(faults) > FAULTS_SHOWN:
+        say(f"and {len(faults) - FAULTS_SHOWN} more; finish the study by {subject.command()}")
     count = len({*paths, *faults})
     say(f"{count - len(faults)} of {count} files are as the last run left them")
-    if LOST in faults.values():
+    if NOT_THERE in faults.values():
         return Status.MISSING
     return Status.DIFFERS if faults else Status.HOLDS
 
@@ -69,11 +69,11 @@ def verify_files(subject: Subject) -> Status:
 def _fault(path: str, entry: Entry | None, ours: bool) -> str:
     """Text on the fault of the file at ``path``; empty if it fits its ``entry``."""
     if not ours:
-        return FOREIGN
+        return NOT_OURS
     if not Path(path).is_file():
-        return LOST
+        return NOT_THERE
     if entry is None:
-        return UNLISTED
+        return NOT_LISTED
     return "" if entry.fits(Path(path)) else DAMAGED
 
 
@@ -86,7 +86,7 @@ def differing(job: Job) -> list[str]:
         new = [os.path.join(folder, os.path.relpath(path, root)) for path in old]
         try:
             job.make(dict(zip(job.outputs, new, strict=True)))
-        except FAULTS:
+        except JOB_ERRORS:
             return old
         return [o for o, n in zip(old, new, strict=True) if not filecmp.cmp(o, n, shallow=False)]
 

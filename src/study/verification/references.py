@@ -20,9 +20,9 @@ from study.verification.compare import kept
 
 # Stored digits of numbers; the error of rounding is at most a hundredth of any tolerance.
 DIGITS = 9
-ENDS, PACKED_FROM = (".csv", ".csv.xz"), 50_000  # larger files (in bytes) are compressed
+SUFFIXES, PACKED_BYTES = (".csv", ".csv.xz"), 50_000  # larger files (in bytes) are compressed
 LOG = "changes.md"
-HEAD = """# Changes of the expected tables
+LOG_HEADER = """# Changes of the expected tables
 
 Written by `./reproduce verify --update --reason "..."`, newest last.
 
@@ -46,8 +46,8 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
     """Write ``frame``, the content of ``table``, as the expected table into ``folder``."""
     stored, form = frame[[c.name for c in kept(table)]], f"%.{DIGITS}g"
     content = stored.to_csv(index=False, float_format=form, lineterminator="\n").encode()
-    path, other = (folder / f"{table.name}{end}" for end in ENDS)
-    if len(content) > PACKED_FROM:
+    path, other = (folder / f"{table.name}{suffix}" for suffix in SUFFIXES)
+    if len(content) > PACKED_BYTES:
         path, other, content = other, path, lzma.compress(content, preset=9)
     write_tracked(path, content)
     other.unlink(missing_ok=True)
@@ -57,7 +57,7 @@ def read_references(folder: Path) -> dict[str, Reference]:
     """Return name -> expected table in ``folder``; StorageError if one cannot be read."""
     found = {}
     for name, table in declared().items():
-        for path in (p for end in ENDS if (p := folder / f"{name}{end}").is_file()):
+        for path in (p for suffix in SUFFIXES if (p := folder / f"{name}{suffix}").is_file()):
             try:
                 frame = pd.read_csv(path)
             except (OSError, EOFError, lzma.LZMAError, ValueError) as error:
@@ -71,5 +71,5 @@ def read_references(folder: Path) -> dict[str, Reference]:
 def note(folder: Path, reason: str, day: date, code: str) -> None:
     """Add ``day``, version of the code and reason of an update to the log in ``folder``."""
     path = folder / LOG
-    text = path.read_text(encoding="utf-8") if path.is_file() else HEAD
+    text = path.read_text(encoding="utf-8") if path.is_file() else LOG_HEADER
     write_tracked(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())

@@ -28,7 +28,7 @@ def test_a_reference_comes_back_without_times_and_a_large_one_is_packed(
         write_reference(TABLE, frame, tmp_path)
         assert [path.name for path in tmp_path.iterdir()] == [f"reduced_reruns{end}"]
         read.append(read_references(tmp_path)[TABLE.name])
-        monkeypatch.setattr(references, "PACKED_FROM", 100)
+        monkeypatch.setattr(references, "PACKED_BYTES", 100)
     lost = dict.fromkeys(set(TABLE.column_names) - set(read[0].columns))
     for reference in read:
         pd.testing.assert_frame_equal(reference.frame, TABLE.checked(frame.assign(**lost)))

@@ -170,15 +170,6 @@ def test_a_fault_is_noticed_and_its_command_named(change, name, said, monkeypatc
     assert status is (Status.MISSING if missing else Status.DIFFERS)
 
 
-def test_many_faults_are_counted(monkeypatch, capsys):
-    more = {f"results/tables/{i}.csv" for i in range(30)}
-    monkeypatch.setattr(SUBJECT.plan, "own_files", {*NAMES, *more})
-    assert verify_files(SUBJECT) is Status.MISSING
-    said = capsys.readouterr().out
-    assert f"and 10 more; finish the study by {STUDY}\n" in said
-    assert "4 of 34 files" in said
-
-
 def test_outputs_of_one_name_stay_apart():
     """A page of the article has the name of a table's page in a folder of its own."""
     paths = {"page": "results/article/a.html", "other": "results/article/tables/a.html"}
