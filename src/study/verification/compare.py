@@ -55,8 +55,8 @@ def identifies(column: Column) -> bool:
 
 def identities(rows: pd.DataFrame, columns: list[str]) -> list[tuple[str, ...]]:
     """Return for each row its cells in ``columns`` as texts; ``nan`` if it has no such column."""
-    cells = rows.reindex(columns=columns).astype(object)
-    return list(cells.where(cells.notna(), "nan").astype(str).itertuples(index=False, name=None))
+    cells = rows.reindex(columns=columns).itertuples(index=False, name=None)
+    return [tuple("nan" if pd.isna(cell) else str(cell) for cell in row) for row in cells]
 
 
 def selected_by_fit(rows: pd.DataFrame) -> np.ndarray:
