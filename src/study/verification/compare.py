@@ -207,8 +207,9 @@ class Comparison:
         self, name: str, cells: np.ndarray, changed: np.ndarray, share: float, number: int
     ) -> Iterator[Difference]:
         """Yield a difference for each part in which too many of the ``cells`` have ``changed``."""
-        for place, part in self.parts.items() if (cells & changed).any() else ():
-            total, count = int(cells[part].sum()), int((cells & changed)[part].sum())
+        changed = cells & changed
+        for place, part in self.parts.items() if changed.any() else ():
+            total, count = int(cells[part].sum()), int(changed[part].sum())
             if count > (allowed := max(number, math.ceil(share * total))):
                 text = f"expected at most {allowed} of {total} changed, found {count}"
                 yield np.inf, f"{name}{place}: {text}"
