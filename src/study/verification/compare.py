@@ -60,8 +60,8 @@ def identities(rows: pd.DataFrame, columns: list[str]) -> list[tuple[str, ...]]:
 
 
 def selected_by_fit(rows: pd.DataFrame) -> np.ndarray:
-    """Boolean array: rows of ECSW, or all rows if a table names its elements but no method."""
-    method = rows.get("method", pd.Series("ecsw" if "elements_sampled" in rows else "", rows.index))
+    """Boolean array: rows of ECSW, or all rows if a table without methods has its tolerance."""
+    method = rows.get("method", pd.Series("ecsw" if "tau" in rows else "", rows.index))
     return method.astype(str).str.contains("ecsw").to_numpy(dtype=bool)
 
 
