@@ -11,8 +11,8 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 36_100,
-    "lines of tests": 23_100,
+    "lines of src": 36_075,
+    "lines of tests": 23_160,
     "words of documentation": 25_700,
     "tables": 27,
     "figures": 23,
