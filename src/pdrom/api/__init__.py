@@ -10,21 +10,8 @@ from pdrom.api.pictures import plot, view
 from pdrom.api.records import Errors, Run
 from pdrom.api.runs import basis, methods, run
 from pdrom.api.training import train
-from pdrom.core.errors import ConfigurationError
 
 __all__ = [
     "Errors", "Model", "Run", "basis", "build_scene", "cost", "load", "load_model", "load_scene",
     "methods", "plot", "run", "save", "train", "view",
 ]  # fmt: skip
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
-
-
-def __getattr__(name: str) -> None:
-    if name == "reduce":
-        raise ConfigurationError(
-            "pdrom.api.reduce is train(full, group=..., method=..., r=...) now"
-        )
-    raise AttributeError(f"module 'pdrom.api' has no attribute '{name}'")

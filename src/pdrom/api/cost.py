@@ -14,13 +14,12 @@ import pandas as pd
 from pdrom.api import files
 from pdrom.api.model import Model, load_model, silent, timed
 from pdrom.api.records import standstill
-from pdrom.api.training import EVALUATIONS, Progress, tolerance_of
-from pdrom.core.errors import ConfigurationError, NotReducibleError, PdromError, SolverError
+from pdrom.api.training import EVALUATIONS, Progress, converged_reference, tolerance_of
+from pdrom.core.errors import ConfigurationError, NotReducibleError, PdromError
 from pdrom.core.yamlfile import shown
 from pdrom.model.coarser import Coarser, error_of_mesh, grids, on_mesh
 from pdrom.model.mesh.config import MeshFile
 from pdrom.model.mesh.types import Mesh
-from pdrom.model.runs import converged_run
 from pdrom.model.scene import Scene
 from pdrom.reduction import settings
 from pdrom.reduction.deviations import Yardstick
@@ -54,19 +53,12 @@ def cost(
     progress : called with name and number of frames of the converged run; returns a function that
         is called after each frame
 
-    Returns
-    -------
-    DataFrame
-        Cheapest first: ``setting`` in words, ``method``, ``iterations`` of a frame (NA: converged),
-        ``vertices`` that are simulated, `ERRORS` against the converged step (NaN of a rigid body,
-        inf: blew up), ``ms`` per frame, ``best`` (no other setting is as good in position error and
-        time and better in one). ``attrs`` are ``frames`` that were timed, ``busy`` (other programs
-        ran: times mean nothing), ``mesh_error`` (see `error_of_mesh`).
-
-    Raises
-    ------
-    ConfigurationError, SceneError, MeshError, StorageError, SolverError
-        A wrong argument or file; no coarser mesh; a model of another mesh; no convergence, motion.
+    Returns a table, cheapest first: ``setting`` in words, ``method``, ``iterations`` of a frame
+    (NA: converged), ``vertices`` that are simulated, `ERRORS` against the converged step (NaN of a
+    rigid body, inf: blew up), ``ms`` per frame, ``best`` (no other setting is as good in position
+    error and time and better in one). ``attrs`` are ``frames`` that were timed, ``busy`` (other
+    programs ran: times mean nothing), ``mesh_error`` (see `error_of_mesh`). Raises PdromError for a
+    wrong argument or file, a model of another mesh, no convergence, no motion.
     """
     files.require_runnable(scene, None, progress, "progress")
     for given, what in ((coarser, "coarser"), (models, "models")):
@@ -79,13 +71,7 @@ def cost(
     for number, model in enumerate(models, start=1):
         with _naming(model):
             tried += _of_model(scene, model, number)
-    tick = progress(f"{name}, converged", frames)
-    reference = converged_run(scene, tolerance_of(scene), EVALUATIONS, tick)
-    if reference is None:
-        raise SolverError(
-            f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations, so that "
-            "nothing tells errors; a smaller time_step or smaller weights converge sooner"
-        )
+    reference = converged_reference(scene, progress).positions
     if still := standstill(scene, reference):
         raise NotReducibleError(f"scene '{name}': {still}")
     truth, rows = Yardstick(scene, reference), []

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import h5py
 import numpy as np
 import pandas as pd
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
 from pdrom.api import files
 from pdrom.api.records import Run
@@ -94,16 +94,16 @@ class Model:
     validation: pd.DataFrame
 
     def __repr__(self) -> str:
-        own, solved = self.reduced, " converged" * self.training.converged
+        own, errors = self.reduced, ""
         kept = own.columns.B if isinstance(own, SubspaceModel) else own.reduction.basis.V
-        parts = [f"Model({self.title}: {self.training}"]
-        if len(self.validation):
+        if count := len(self.validation):
             position, deformation = worst_errors(self.validation)
-            count = len(self.validation)
-            against = f"against {count}{solved} run{'s' * (count > 1)} of the full order"
-            errors = f"{position:.2g} (positions), {deformation:.2g} (deformation)"
-            parts.append(f"largest errors {against} {errors}")
-        return f"{', '.join(parts)}, {kept.nbytes / 1e6:.2g} MB)"
+            solved = " converged" * self.training.converged
+            errors = (
+                f"largest errors against {count}{solved} run{'s' * (count > 1)} of the full order "
+                f"{position:.2g} (positions), {deformation:.2g} (deformation), "
+            )
+        return f"Model({self.title}: {self.training}, {errors}{kept.nbytes / 1e6:.2g} MB)"
 
     @property
     def title(self) -> str:
@@ -131,16 +131,9 @@ class Model:
         iterations : of a frame; None: until it has converged (Newton), or those of the scene
         solver : "newton" or "local_global" (as the full order); None: that of the training
 
-        Returns
-        -------
-        Run
-            Positions of all vertices, and milliseconds of each frame, in which they are included.
-
-        Raises
-        ------
-        ConfigurationError, NotReducibleError, StorageError
-            The scene has another mesh, other groups or holds, or an effect that the model cannot
-            simulate; ``out`` cannot be written.
+        Returns positions of all vertices, and milliseconds of each frame, in which they are
+        included. Raises PdromError if the scene has another mesh, other groups or holds, or an
+        effect that the model cannot simulate, or if ``out`` cannot be written.
         """
         files.require_runnable(scene, out, on_frame)
         loop, start = self.loop(scene, iterations, solver)
@@ -173,19 +166,11 @@ class Model:
     def view(self, path: str | os.PathLike[str], full: Run | None = None) -> None:
         """Write a page (HTML, one file) in which the model runs, and a reader drags its handles.
 
-        Parameters
-        ----------
-        path : file to write
-        full : full-order run, shown as wires, whose scene the model runs; None: the training scene
-
-        Raises
-        ------
-        ConfigurationError, SceneError, NotReducibleError, StorageError
-            The model reduces projections; the page lacks a group or effect of the scene; ``full``
-            is none, or of a scene that `run` refuses; the page is too large or cannot be written.
+        It runs the scene of ``full``, a full-order run that is shown as wires, else the training
+        scene. PdromError if the model reduces projections, the page lacks a group or effect of the
+        scene, `run` refuses it, or the page is too large or cannot be written to ``path``.
         """
-        store.require_own(files.file_path(path))
-        require_page(path)
+        require_page(files.output(path))
         own, scene, positions = self.reduced, self.scene, None
         if not isinstance(own, SubspaceModel):
             raise NotReducibleError(f"{self.title} reduces projections: train without a method")
@@ -232,8 +217,7 @@ class Model:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the model to the file ``path`` (HDF5), from which `load_model` reads it."""
-        path = files.file_path(path)
-        store.require_own(path)
+        path = files.output(path)
         config = {"scene": self.scene.config.model_dump(mode="json")}
         with made_by("pdrom.api.Model.save", config), store.write_hdf5(path) as file:
             file.attrs.update(format=FORMAT, kind=type(self.reduced).__name__)
@@ -261,6 +245,7 @@ class _Asked(ConfigModel):
     iterations: Annotated[int, Field(ge=1, le=10_000)] | None = None
     solver: Literal["newton", "local_global"] | None = None
     hold: Selection = "x_min"
+    displacement: tuple[FiniteFloat, FiniteFloat, FiniteFloat] = (0.0, 0.0, 0.0)
 
 
 class Loop:
@@ -291,13 +276,8 @@ class Loop:
         ``hold`` is the name of its effect ("pins"), or the selection of its vertices ("left").
         ConfigurationError unless this is one hold of the next frame.
         """
-        try:
-            shift = np.asarray(displacement)
-        except ValueError:
-            shift = np.empty(0)
-        if shift.shape != (3,) or shift.dtype.kind not in "fiu" or not np.isfinite(shift).all():
-            fault = "three finite numbers are required"
-            raise ConfigurationError(f"move: displacement = {shown(displacement, 60)}: {fault}")
+        moves = {"displacement": [*displacement]}
+        shift = np.array(validate(_Asked, moves, "move").displacement)
         active = [b for b in self._loop.space.boundaries if b.active(self.frame)]
         named = isinstance(hold, str)
         found = [b for b in active if named and hold in (b.boundary.name, b.boundary.side)]
@@ -381,25 +361,16 @@ def _export(scene: Scene, model: SubspaceModel, file: h5py.Group) -> None:
 
 
 def load_model(path: str | os.PathLike[str]) -> Model:
-    """Read a model that `Model.save` wrote; it runs with the same bits as the saved one.
+    """Read a model from the file ``path`` that `Model.save` wrote; it runs with the same bits.
 
-    Parameters
-    ----------
-    path : file (HDF5)
-
-    Raises
-    ------
-    StorageError
-        The file is missing, damaged or edited, holds no model, or is of a newer version.
+    StorageError if the file is missing, damaged or edited, holds no model, or is of a newer pdrom.
     """
     path = files.file_path(path)
     with files.opened(path, "model") as file:
         if "model" not in file or "format" not in file.attrs:
             raise StorageError(f"{path}: holds no model (pdrom show says what it holds)")
-        version = int(file.attrs["format"])
-        if version > FORMAT:
-            fault = f"a model of version {version}, this pdrom reads up to {FORMAT}"
-            raise StorageError(f"{path}: {fault}: a newer pdrom wrote it")
+        if (version := int(file.attrs["format"])) > FORMAT:
+            raise StorageError(f"{path}: format {version} of a newer pdrom (allowed: to {FORMAT})")
         return _model(file, path)
 
 

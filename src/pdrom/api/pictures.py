@@ -5,10 +5,9 @@ import os
 import numpy as np
 import pandas as pd
 
-from pdrom.api.files import file_path, require_run
+from pdrom.api.files import output, require_run
 from pdrom.api.records import Run
 from pdrom.core.errors import SceneError
-from pdrom.core.store import require_own
 from pdrom.view import style
 from pdrom.view.artists import Figure
 from pdrom.view.frames import write_frames
@@ -22,21 +21,10 @@ COUNT = r"(^|, )(converged|\d+ iterations?(, Anderson)?)( on )?"
 def plot(reference: Run, *runs: Run) -> Figure:
     """Plot errors of runs against time; a cross marks the end of a run that blew up.
 
-    Parameters
-    ----------
-    reference : run with which the others are compared, such as the full-order run of their scene
-    runs : each gets a line and an entry of the legend
-
-    Returns
-    -------
-    Figure
-        Relative error of every frame over seconds; errors below 1e-7 or above 1e3 are drawn on
-        these limits. ``plot(...).savefig("errors.png")`` writes the picture.
-
-    Raises
-    ------
-    ConfigurationError, SceneError
-        An argument is no run, or compares with ``reference`` in no frame; there is no run.
+    Each of ``runs`` gets a line: its relative error against ``reference``, such as the full-order
+    run of their scene, in every frame over seconds. Errors below 1e-7 or above 1e3 are drawn on
+    these limits. ``plot(...).savefig("errors.png")`` writes the picture. ConfigurationError or
+    SceneError if an argument is no run, or does not compare with ``reference``; without ``runs``.
     """
     if not runs:
         raise SceneError("plot: at least one run beside the reference is required")
@@ -92,22 +80,12 @@ def plot_cost(table: pd.DataFrame) -> Figure:
 def view(path: str | os.PathLike[str], *runs: Run) -> None:
     """Write a page (HTML, one file) that shows runs; a browser opens it without a network.
 
-    Runs with equal scenes are shown together, compared with the full-order run among them.
-
-    Parameters
-    ----------
-    path : file to write; one that ends in .png gets a picture of four frames of each run, which are
-        of one scene
-    runs : full-order and reduced runs
-
-    Raises
-    ------
-    ConfigurationError, SceneError, StorageError
-        An argument is no run; no run is given, or two different scenes have one name; the page
-        would be too large, or cannot be written.
+    Full-order and reduced ``runs`` with equal scenes are shown together, compared with the
+    full-order run among them. If ``path`` ends in .png, it gets a picture of four frames of each
+    run, which are of one scene. PdromError if an argument is no run, no run is given, two different
+    scenes have one name, or the page would be too large or cannot be written.
     """
-    path, scenes = file_path(path), viewed_scenes(*runs)
-    require_own(path)
+    path, scenes = output(path), viewed_scenes(*runs)
     if path.suffix.lower() != ".png":
         write_page(scenes, path)
         return
@@ -119,6 +97,7 @@ def view(path: str | os.PathLike[str], *runs: Run) -> None:
 def viewed_scenes(*runs: Run) -> list[ViewedScene]:
     """Collect ``runs`` of any kind by scene, for pictures and pages.
 
+    They are compared with the first full-order run of their scene, or else its first run.
     ConfigurationError if an argument is no run, SceneError without arguments or if two different
     scenes have one name.
     """
@@ -135,17 +114,14 @@ def viewed_scenes(*runs: Run) -> list[ViewedScene]:
 
 
 def _viewed(runs: list[Run]) -> ViewedScene:
-    """Prepare ``runs`` of a scene, compared with the first full-order run or else the first one."""
     first = next((run for run in runs if run.full_order), runs[0])
-    config = first.scene.config
+    config, shown = first.scene.config, []
+    for run in (each for each in runs if each is not first):
+        ms = float(np.median(run.ms)) if len(run.ms) else None
+        errors = run.errors(first)
+        shown.append(ViewedRun(run.method, run.positions, errors, run.blowup_frame, ms))
     return ViewedScene(
         name=config.name, title=config.title, mesh=first.scene.mesh, time_step=config.time_step,
         positions=first.positions, ms=float(np.median(first.ms)), effects=config.effects,
-        runs=tuple(_shown(run, first) for run in runs if run is not first), method=first.method,
+        runs=tuple(shown), method=first.method,
     )  # fmt: skip
-
-
-def _shown(run: Run, reference: Run) -> ViewedRun:
-    """Prepare a ``run`` for a page that compares it with ``reference``."""
-    ms = float(np.median(run.ms)) if len(run.ms) else None
-    return ViewedRun(run.method, run.positions, run.errors(reference), run.blowup_frame, ms)

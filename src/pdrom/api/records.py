@@ -82,6 +82,7 @@ class Run:
     snapshots : name of each constraint group -> its training snapshots; empty of a reduced run
     method : what computed the run: `FULL`, or the title of a model
     blowup_frame : first frame that blew up; None of a run that did not
+    frame_error : (F,) estimated error of each frame, NaN where it has none; None without estimates
     """
 
     scene: Scene
@@ -90,6 +91,7 @@ class Run:
     snapshots: dict[str, InstanceOf[Snapshots]] = field(default_factory=dict)
     method: Annotated[str, Field(pattern=r"^\P{C}+$")] = FULL
     blowup_frame: Annotated[int, Field(ge=0)] | None = None
+    frame_error: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         require_types(self)
@@ -98,6 +100,8 @@ class Run:
         if done != frames if ended is None else done - ended not in (0, 1) or ended >= frames:
             raise SnapshotError(f"{done} of {frames} frames, blow-up in frame {shown(ended, 60)}")
         arrays = {"positions": (self.positions, (done + 1, vertices, 3)), "ms": (self.ms, (done,))}
+        if self.frame_error is not None:
+            arrays["frame_error"] = self.frame_error, (frames,)
         for name, own in self.snapshots.items():
             group, count, at = self.scene.group(name), own.roundoff.size, own.frames
             whole = at.shape == (count,) and at.dtype.kind in "iu"
@@ -127,20 +131,21 @@ class Run:
     @property
     def title(self) -> str:
         """Description of the run by which messages name it as a reference."""
-        config = self.scene.config
-        asked = config.iterations
-        until = getattr(asked, "error", None)
-        often = f"frame errors of {until}" if until else f"{asked} iterations a frame"
-        again = f", {often}" if self.method == FULL else ""
-        return f"the run of '{config.name}' by {self.method}{again}"
+        config, asked = self.scene.config, self.scene.config.iterations
+        title = f"the run of '{config.name}' by {self.method}"
+        if self.method != FULL:
+            return title
+        if isinstance(asked, int):
+            return f"{title}, {asked} iterations a frame"
+        return f"{title}, frame errors of {asked.error}"
 
     def require_finite(self, name: str) -> None:
         """Raise SnapshotError, naming the run ``name``, if it has NaN or infinite numbers."""
-        for array, values in (("positions", self.positions), ("ms", self.ms)):
-            require_finite(f"{name}: {array}", values, SnapshotError)
+        arrays = {"positions": self.positions, "ms": self.ms}
         for group, own in self.snapshots.items():
-            require_finite(f"{name}: snapshots of {group}", own.p, SnapshotError)
-            require_finite(f"{name}: round-off of {group}", own.roundoff, SnapshotError)
+            arrays |= {f"snapshots of {group}": own.p, f"round-off of {group}": own.roundoff}
+        for array, values in arrays.items():
+            require_finite(f"{name}: {array}", values, SnapshotError)
 
     def error(self, reference: "Run") -> Errors:
         """Errors of the positions and of the deformation against ``reference``, over all frames.
@@ -174,12 +179,11 @@ class Run:
         if not isinstance(reference, Run):
             raise ConfigurationError(f"reference = {shown(reference, 60)}: a Run is required")
         own, other = self.scene, reference.scene
-        alike = {
-            "mesh": np.array_equal(own.mesh.points, other.mesh.points),
-            "time step": own.config.time_step == other.config.time_step,
-            "number of frames": own.config.frames == other.config.frames,
-        }
-        for name, same in alike.items():
+        for name, same in (
+            ("mesh", np.array_equal(own.mesh.points, other.mesh.points)),
+            ("time step", own.config.time_step == other.config.time_step),
+            ("number of frames", own.config.frames == other.config.frames),
+        ):
             if not same:
                 fault = f"another {name} than {reference.title}: errors compare runs frame by frame"
                 raise ConfigurationError(f"{self.title}: {fault}")
@@ -212,6 +216,7 @@ def stored_run(scene: Scene, file: h5py.File) -> Run:
         scene, file["positions"][...], file["timings"][...].sum(axis=1),
         {name: Snapshots(*(s[key][...] for key in _SNAPSHOTS)) for name, s in stored.items()},
         str(file.attrs.get("method", FULL)), None if ended < 0 else ended,
+        file["frame_error"][...] if "frame_error" in file else None,
     )  # fmt: skip
 
 
@@ -227,5 +232,7 @@ def store_run(run: Run, file: h5py.File) -> None:
             kept[key] = getattr(own, key)
         group = run.scene.group(name)
         kept.attrs.update(elements=group.elements, rows_per_element=group.rows_per_element)
+    if run.frame_error is not None:
+        file["frame_error"] = run.frame_error
     file.attrs["method"] = run.method
     file.attrs["blowup_frame"] = -1 if run.blowup_frame is None else run.blowup_frame

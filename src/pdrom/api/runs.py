@@ -74,18 +74,10 @@ def run(
         holds, count on; pins that ``start`` has not begin there, and handles at their ``start``
     estimate : estimate the error of every 20th frame, see `pdrom.model.dynamics.convergence`
 
-    Returns
-    -------
-    Run
-        Positions and milliseconds of every frame, snapshots of every group, not of kept frames.
-        If ``start`` ran with other settings, ``method`` says so.
-
-    Raises
-    ------
-    ConfigurationError, StorageError
-        ``scene`` is no scene; ``start`` does not suit it or has no such frame; a handle or initial
-        velocity of ``scene`` would begin before it; ``out`` cannot be written. All is checked
-        before the run.
+    Returns positions and milliseconds of every frame, and snapshots of every group, not of kept
+    frames. If ``start`` ran with other settings, ``method`` says so. Raises PdromError, before the
+    run, if an argument is wrong: ``start`` does not suit ``scene`` or has no such frame, a handle
+    or initial velocity of ``scene`` would begin before it, or ``out`` cannot be written.
     """
     files.require_runnable(scene, out, on_frame)
     begun, method = _begun(scene, start, frame)
@@ -193,25 +185,15 @@ def check(full: Run) -> Errors:
 
 
 def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:
-    """Basis of the projections of a constraint group, as a reduction method requires it.
+    """Compute the POD basis of the projections of a constraint ``group`` of the run ``full``.
 
-    Parameters
-    ----------
-    full : full-order run that has the training snapshots
-    group : name of a constraint group of its scene
-    method : name in config/methods.yaml, or a specification; it sets how the snapshots are centred
-        and weighted, and whether the axes x, y, z have coefficients in common
+    ``method``, a name in config/methods.yaml or a specification, sets how the snapshots are centred
+    and weighted, and whether the axes x, y, z have coefficients in common.
 
-    Returns
-    -------
-    Basis
-        Modes ``V`` (3 e p, rank), ``mean`` (3 e p,), all ``singular_values``, ``rank`` (number of
-        modes above round-off). A vector has e elements one after another, p rows (x, y, z) each.
-
-    Raises
-    ------
-    ConfigurationError, SceneError, SnapshotError
-        ``full`` is no run; the method or group is unknown; snapshots are too few or not finite.
+    Returns modes ``V`` (3 e p, rank), ``mean`` (3 e p,), all ``singular_values``, ``rank`` (number
+    of modes above round-off). A vector has e elements one after another, p rows (x, y, z) each.
+    Raises PdromError if ``full`` is no run, the method or group is unknown, or snapshots are too
+    few or not finite.
     """
     files.require_run(full, "full")
     files.require(str, group, "group", source="the name of a constraint group")

@@ -14,7 +14,7 @@ from pdrom.api import files
 from pdrom.api.model import Model, OnFrame, Training, require_same_mesh, silent, worst_errors
 from pdrom.api.records import FULL, Run, standstill
 from pdrom.api.runs import group_of, method_spec, projections_model, run
-from pdrom.core.errors import ConfigurationError, NotReducibleError, SnapshotError
+from pdrom.core.errors import ConfigurationError, NotReducibleError, SnapshotError, SolverError
 from pdrom.core.store import require_finite
 from pdrom.core.yamlfile import ConfigModel, keys_of, shown
 from pdrom.core.yamlfile import validate as checked
@@ -140,13 +140,9 @@ def train(
     progress : called with name and number of frames of each long step; returns a function that is
         called after each of its frames
 
-    Raises
-    ------
-    ConfigurationError, SceneError, SnapshotError, RankError
-        A wrong argument; runs of different meshes; too few modes or snapshots.
-    NotReducibleError
-        No tried model is within ``error``, a training scene does not converge or has an effect that
-        no position subspace can simulate, or nothing moves.
+    Raises PdromError for a wrong argument, runs of different meshes, too few modes or snapshots;
+    NotReducibleError if no tried model is within ``error``, or a training scene has an effect that
+    no position subspace can simulate or does not move; SolverError if it does not converge.
     """
     started = perf_counter()
     given, runs = locals(), [_full_order(one) for one in (full, *others)]
@@ -163,10 +159,10 @@ def train(
     hold = [select_vertices(full.scene.mesh, one) for one in asked.hold]
     more = _variations(full.scene, "variation", asked.variations, 1)
     own = _own_columns(full.scene, basis)
-    if asked.converged:
-        references = [_reference(s, True, progress) for s in [*(one.scene for one in runs), *more]]
-    else:
-        references = [*runs, *(_reference(scene, False, progress) for scene in more)]
+    references = [
+        converged_reference(one.scene, progress) if asked.converged else one for one in runs
+    ]
+    references += [_reference(scene, asked.converged, progress) for scene in more]
     spent = perf_counter() - started
     tests = [_reference(scene, asked.converged, progress) for scene in drawn]
     tried: list[tuple[float, str]] = []
@@ -255,18 +251,22 @@ def tolerance_of(scene: Scene) -> float:
 
 
 def _reference(scene: Scene, converged: bool, progress: Progress) -> Run:
-    """Full-order run of ``scene``; NotReducibleError if it shall be ``converged`` and is not."""
+    if converged:
+        return converged_reference(scene, progress)
+    return run(scene, on_frame=progress(scene.config.name, scene.config.frames))
+
+
+def converged_reference(scene: Scene, progress: Progress) -> Run:
+    """Run ``scene`` in full order with converged frames; SolverError if one does not converge."""
     name, frames = scene.config.name, scene.config.frames
-    if not converged:
-        return run(scene, on_frame=progress(name, frames))
     started = perf_counter()
     log.info("%s: solving every frame to convergence", name)
     tick = progress(f"{name}, converged", frames)
     found = converged_run(scene, tolerance_of(scene), EVALUATIONS, tick)
     if found is None:
-        raise NotReducibleError(
-            f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations; "
-            "converged=False (--unconverged) trains on the frames as they are"
+        raise SolverError(
+            f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations; a smaller "
+            "time_step or smaller weights help; converged=False (--unconverged) trains without"
         )
     ms = np.full(frames, 1e3 * (perf_counter() - started) / frames)
     log.info("%s: converged in %.1f s", name, 1e-3 * ms.sum())

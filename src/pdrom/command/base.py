@@ -7,6 +7,8 @@ from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pdrom.core.errors import StorageError
+
 if TYPE_CHECKING:
     from pdrom.model.scene import Scene
 
@@ -29,27 +31,39 @@ class Command:
     perform: Callable[[argparse.Namespace], Status]
 
 
-# Keywords of `add_argument` for arguments that several commands have.
-SCENE = {"metavar": "SCENE.yaml", "help": "file of the scene"}
-UNCHECKED = {
-    "action": "store_true",
-    "help": "read a run without a checksum inside (by an older pdrom) if it is sound",
-}
+def text(metavar: str, what: str, **more: Any) -> dict[str, Any]:
+    """Keywords of an argument that is a text or several; ``what`` is its help."""
+    return {"metavar": metavar, "help": what, **more}
 
 
-def files_of(file: str, scene: "Scene") -> list[str]:
-    """Paths of the files of a ``scene``: the scene's ``file`` and, if it has one, its mesh file."""
+def number(default: float | None, what: str) -> dict[str, Any]:
+    """Keywords of an option that is a number, with its default value; None has no value."""
+    shown = what if default is None else f"{what} ({default:g})"
+    return {"type": int if isinstance(default, int) else float, "default": default, "help": shown}
+
+
+def flag(what: str) -> dict[str, Any]:
+    """Keywords of an option without a value."""
+    return {"action": "store_true", "help": what}
+
+
+# Arguments that several commands have.
+SCENE = text("SCENE.yaml", "file of the scene")
+UNCHECKED = flag("read a run without a checksum inside (by an older pdrom) if it is sound")
+
+
+def require_output(
+    path: str | Path, reads: Sequence[str | Path], scene: "Scene | None" = None
+) -> None:
+    """Refuse an output ``path`` that is one of the files ``reads``, or that pdrom may not write.
+
+    The first of ``reads`` is the file of the ``scene``; its mesh file is read, too.
+    """
+    from pdrom.core.store import require_own
     from pdrom.model.mesh.config import MeshFile
 
-    mesh = scene.config.mesh
-    return [file, *([str(mesh.file(Path(file).parent))] if isinstance(mesh, MeshFile) else [])]
-
-
-def require_output(path: str | Path, reads: Sequence[str]) -> None:
-    """Check that the output ``path`` is none of the files ``reads``, and with `require_own`."""
-    from pdrom.core.errors import StorageError
-    from pdrom.core.store import require_own
-
+    if scene and isinstance(scene.config.mesh, MeshFile):
+        reads = [*reads, scene.config.mesh.file(Path(reads[0]).parent)]
     if any(Path(path).resolve() == Path(read).resolve() for read in reads):
         raise StorageError(f"{path}: would be overwritten, and is read by this command")
     require_own(path)

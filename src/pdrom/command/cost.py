@@ -5,13 +5,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pdrom.command.base import SCENE, Command, Status, files_of, require_output
+from pdrom.command.base import SCENE, Command, Status, require_output, text
+from pdrom.core.errors import ConfigurationError
 
 if TYPE_CHECKING:
     import pandas as pd
 
 ERROR = {"nan": "-", "inf": "blew up"}
-SEVERAL = {"nargs": "+", "default": []}
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -19,15 +19,13 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.api import cost, load_scene
     from pdrom.api.pictures import plot_cost
     from pdrom.command.progress import Progress
-    from pdrom.core.errors import ConfigurationError
     from pdrom.core.store import MARK, atomic_path
 
     scene, out = load_scene(arguments.scene), arguments.plot
     if out:
         if Path(out).suffix.lower() != ".png":
             raise ConfigurationError(f"--plot {out}: the name of a picture ends in .png")
-        read = files_of(arguments.scene, scene)
-        require_output(out, [*read, *arguments.coarser, *arguments.model])
+        require_output(out, [arguments.scene, *arguments.coarser, *arguments.model], scene)
     table = cost(scene, arguments.coarser, arguments.model, Progress)
     sys.stdout.write(f"{shown(table, scene.config.frames)}\n")
     if out:
@@ -64,13 +62,9 @@ COMMAND = Command(
     "pdrom cost bar.yaml --coarser coarse.msh --model bar.model.h5 --plot cost.png",
     {
         "scene": SCENE,
-        "--coarser": {
-            "metavar": "MESH",
-            "help": "files of coarser meshes, read as the scene's own; grids are made if left out",
-            **SEVERAL,
-        },
-        "--model": {"metavar": "MODEL", "help": "files by pdrom train, of its mesh", **SEVERAL},
-        "--plot": {"metavar": "FILE", "help": "picture of error against time (.png)"},
+        "--coarser": text("MESH", "coarser meshes (else grids are made)", nargs="+", default=[]),
+        "--model": text("MODEL", "files by pdrom train, of its mesh", nargs="+", default=[]),
+        "--plot": text("FILE", "picture of error against time (.png)"),
     },
     perform,
 )

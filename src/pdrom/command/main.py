@@ -50,10 +50,6 @@ def parser() -> argparse.ArgumentParser:
 def run(arguments: Sequence[str]) -> int:
     """Run the command that ``arguments`` name; return the exit code."""
     try:
-        os.getcwd()
-    except OSError:
-        return _fail("the working folder is not there any more; change to another one")
-    try:
         try:
             found = _parsed(arguments)
             return int(found.perform(found))
@@ -83,8 +79,7 @@ def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
     """Parse the command line; a misspelt command or option gets a suggestion."""
     top = parser()
     if arguments and arguments[0][:1] != "-" and arguments[0] not in COMMANDS:
-        gone = "; it is `pdrom train --method` now" * (arguments[0] == "reduce")
-        top.error(f"no command '{arguments[0]}'{choices(arguments[0], COMMANDS)}{gone}")
+        top.error(f"no command '{arguments[0]}'{choices(arguments[0], COMMANDS)}")
     found, unknown = top.parse_known_args(arguments)
     if hasattr(found, "runs"):  # argparse does not know files behind an option
         found.runs += [word for word in unknown if word[:1] != "-"]

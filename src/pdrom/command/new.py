@@ -10,7 +10,10 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
-from pdrom.command.base import Command, Status
+from pdrom.command.base import Command, Status, number, text
+from pdrom.core import config_file
+from pdrom.core.errors import ConfigurationError, SceneError, reason
+from pdrom.core.yamlfile import named, validate
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,7 +30,6 @@ ENOUGH = 3  # smallest number of fixed vertices with which a body cannot turn ab
 def perform(arguments: argparse.Namespace) -> Status:
     """Write the scene that ``arguments`` name, with comments; an existing file is left alone."""
     from pdrom.api.files import require_no_mesh
-    from pdrom.core.errors import ConfigurationError, reason
 
     if arguments.scene is None and arguments.mesh is None:
         raise ConfigurationError("SCENE or --mesh is required: the file to write, or a mesh")
@@ -59,8 +61,6 @@ def template(
     in which vertices that are closer than ``merge`` times the extent are merged. Numbers and sides
     in examples fit the mesh.
     """
-    from pdrom.core import config_file
-    from pdrom.core.yamlfile import named
     from pdrom.model.mesh.generators import Plane, cloth
     from pdrom.model.mesh.types import vertex_measures
 
@@ -104,8 +104,6 @@ def _along(axis: int, number: float) -> list[float]:
 
 def _read(file: str, scene: Path, merge: float) -> "tuple[str, Mesh]":
     """Path of the mesh ``file`` relative to the folder of the ``scene`` file, and its mesh."""
-    from pdrom.core.errors import ConfigurationError
-    from pdrom.core.yamlfile import validate
     from pdrom.model.mesh.config import MeshFile
 
     folder = scene.resolve().parent
@@ -135,7 +133,6 @@ def _about(mesh: "Mesh") -> str:
 
 def _sides(mesh: "Mesh") -> "dict[str, np.ndarray]":
     """Map the name of each side that the mesh has (x_min ...) to its vertices."""
-    from pdrom.core.errors import SceneError
     from pdrom.model.mesh.selection import SIDES, select_vertices
 
     found = {}
@@ -179,14 +176,9 @@ COMMAND = Command(
     "Write the file of a new scene, with comments",
     "pdrom new sheet.yaml --mesh sheet.obj",
     {
-        "scene": {"metavar": "SCENE", "nargs": "?", "help": "file to write; else beside the mesh"},
-        "--mesh": {"metavar": "FILE", "help": "mesh file (.obj, .vtu, .msh ...)"},
-        "--merge": {
-            "type": float,
-            "default": 0.0,
-            "metavar": "FRACTION",
-            "help": "merge vertices of the mesh that are closer than this fraction of its extent",
-        },
+        "scene": text("SCENE", "file to write; else beside the mesh", nargs="?"),
+        "--mesh": text("FILE", "mesh file (.obj, .vtu, .msh ...)"),
+        "--merge": number(0.0, "merge vertices that are closer than this part of its extent"),
         "--up": {"choices": "xyz", "default": "y", "help": "axis of the mesh that points up (y)"},
     },
     perform,

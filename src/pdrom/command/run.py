@@ -5,7 +5,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pdrom.command.base import SCENE, UNCHECKED, Command, Status, files_of, require_output
+from pdrom.command.base import SCENE, UNCHECKED, Command, Status, flag, require_output, text
+from pdrom.core.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from pdrom.api import Model, Run
@@ -19,12 +20,9 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.api.records import standstill
     from pdrom.api.runs import check
     from pdrom.command.progress import Progress
-    from pdrom.core.errors import ConfigurationError
     from pdrom.model.mesh.checks import seams
 
     file, scene = Path(arguments.scene), load_scene(arguments.scene)
-    others = arguments.model, arguments.compare, arguments.start
-    read = [*files_of(arguments.scene, scene), *filter(None, others)]
     part, whole = arguments.model, "only of runs in full order (without --model)"
     for wrong, fault in (
         (part and (arguments.start or arguments.frame is not None), f"--from, --frame: {whole}"),
@@ -38,7 +36,8 @@ def perform(arguments: argparse.Namespace) -> Status:
     if arguments.model:
         name += f"_{Path(arguments.model).stem.removesuffix('.model')}"
     out = arguments.out or str(file.parent / f"{name}.h5")
-    require_output(out, read)
+    others = filter(None, (arguments.model, arguments.compare, arguments.start))
+    require_output(out, [arguments.scene, *others], scene)
     model = load_model(arguments.model) if arguments.model else None
     reference = load(arguments.compare, arguments.unchecked) if arguments.compare else None
     if reference and not (reference.full_order and reference.scene.config == scene.config):
@@ -79,20 +78,13 @@ COMMAND = Command(
     "pdrom run sheet.yaml --out sheet.h5",
     {
         "scene": SCENE,
-        "--model": {"metavar": "MODEL", "help": "file by pdrom train: the model runs the scene"},
-        "--compare": {
-            "metavar": "RUN.h5",
-            "help": "full-order run of the scene, to which the model's run is compared",
-        },
-        "--from": {"dest": "start", "metavar": "RUN.h5", "help": "run that goes on in this scene"},
-        "--frame": {"type": int, "metavar": "N", "help": "after so many of its frames (all)"},
-        "--out": {
-            "metavar": "FILE",
-            "help": "file to write (HDF5); SCENE.h5 beside the scene without it, SCENE_MODEL.h5 "
-            "with a model",
-        },
-        "--check": {"action": "store_true", "help": "estimate its error by a second, finer run"},
-        "--no-estimate": {"action": "store_true", "help": "do not estimate errors of frames"},
+        "--model": text("MODEL", "file by pdrom train: the model runs the scene"),
+        "--compare": text("RUN.h5", "full-order run with which the model's run is compared"),
+        "--from": text("RUN.h5", "run that goes on in this scene", dest="start"),
+        "--frame": text("N", "after so many of its frames (all)", type=int),
+        "--out": text("FILE", "file to write (HDF5; SCENE.h5 or SCENE_MODEL.h5 without it)"),
+        "--check": flag("estimate its error by a second, finer run"),
+        "--no-estimate": flag("do not estimate errors of frames"),
         "--unchecked": UNCHECKED,
     },
     perform,

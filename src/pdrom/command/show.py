@@ -11,14 +11,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pdrom.command.base import Command, Status
+import yaml
+
+from pdrom.command.base import Command, Status, flag, text
+from pdrom.core import config_file
+from pdrom.core.errors import ConfigurationError, StorageError, choices
+from pdrom.core.provenance import RECORD
+from pdrom.core.yamlfile import named, read_yaml, validate
 
 LONGEST = 100  # largest number of characters shown of an HDF5 attribute's value
 
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Print the contents of the file of ``arguments``, or about a word; no file is changed."""
-    from pdrom.core.provenance import RECORD
     from pdrom.core.store.checksum import check_file, provenance_of
 
     path = Path(arguments.file)
@@ -48,10 +53,6 @@ def _explained(word: str) -> list[str]:
 
     They explain all that has this name, with its keys, and the keys of this name or value.
     """
-    from pdrom.core import config_file
-    from pdrom.core.errors import ConfigurationError, choices
-    from pdrom.core.yamlfile import read_yaml
-
     lines = list[tuple[str, list[str]]]()  # each with the words that it explains
     for form, keys in read_yaml(config_file("words.yaml")).items():
         lines.append((f"{form}: {keys.pop('is')}", form.split()))
@@ -68,9 +69,6 @@ def _explained(word: str) -> list[str]:
 
 def _hdf5(path: Path, whole: bool) -> Iterator[str]:
     import h5py
-
-    from pdrom.core.errors import StorageError
-    from pdrom.core.provenance import RECORD
 
     try:
         with h5py.File(path, "r") as file:
@@ -90,9 +88,7 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
 
 
 def _item(name: str, item: Any) -> Iterator[str]:
-    import h5py
-
-    if isinstance(item, h5py.Dataset):
+    if hasattr(item, "shape"):  # a dataset, no group
         unit = item.attrs.get("unit", "")
         shape = " x ".join(map(str, item.shape)) or "one value"
         more = [f"{k}: {_short(v)}" for k, v in item.attrs.items() if k != "unit"]
@@ -103,8 +99,6 @@ def _item(name: str, item: Any) -> Iterator[str]:
 
 
 def _configuration(configuration: Any, whole: bool) -> Iterator[str]:
-    import yaml
-
     yield "configuration:"
     if whole or not isinstance(configuration, dict):
         text = yaml.safe_dump(configuration, sort_keys=False, width=100)
@@ -120,7 +114,6 @@ def _configuration(configuration: Any, whole: bool) -> Iterator[str]:
 
 def _scene(path: Path) -> dict[str, Any]:
     """Return a scene's settings as they are understood, from its YAML file; {} of another file."""
-    from pdrom.core.yamlfile import named, read_yaml, validate
     from pdrom.model.scene import SceneConfig
 
     keys = named(read_yaml(path), path.stem)
@@ -130,10 +123,7 @@ def _scene(path: Path) -> dict[str, Any]:
 
 def _effects(scene: dict[str, Any]) -> Iterator[str]:
     """Yield a line for each effect of a ``scene``: its keys with values and units."""
-    from pdrom.core import config_file
-    from pdrom.core.yamlfile import read_yaml
-
-    yield from ["effects:"] if scene else []
+    yield from [f"iterations: {scene['iterations']}", "effects:"] if scene else []
     words = read_yaml(config_file("words.yaml"))
     for own in scene.get("effects", ()):
         known = words.get(f"effect {own['effect']}", {})
@@ -170,8 +160,8 @@ COMMAND = Command(
     "Say what a result is (content, units, provenance), or what a word of a scene's file means",
     "pdrom show results/fom/spring_oop/train.h5",
     {
-        "file": {"metavar": "FILE", "help": "a result, or a word such as spring or scene"},
-        "--configuration": {"action": "store_true", "help": "the whole configuration, as YAML"},
+        "file": text("FILE", "a result, or a word such as spring or scene"),
+        "--configuration": flag("the whole configuration, as YAML"),
     },
     perform,
 )

@@ -4,7 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from pdrom.command.base import SCENE, UNCHECKED, Command, Status, files_of, require_output
+from pdrom.command.base import SCENE, UNCHECKED, Command, Status, flag, number, require_output, text
+from pdrom.core.errors import StorageError
 
 
 def perform(arguments: argparse.Namespace) -> Status:
@@ -12,11 +13,10 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.api import load, load_scene, run, train
     from pdrom.api.training import arguments as check
     from pdrom.command.progress import Progress
-    from pdrom.core.errors import StorageError
 
     file = Path(arguments.scene)
     out, scene = arguments.out or str(file.parent / f"{file.stem}.model.h5"), load_scene(file)
-    require_output(out, [*files_of(arguments.scene, scene), *arguments.runs])
+    require_output(out, [arguments.scene, *arguments.runs], scene)
     keys = ("modes", "tolerance", "skinning", "hold", "variations", "validate", "error")
     given = {key: getattr(arguments, key) for key in (*keys, "group", "method", "r")}
     given |= {"converged": not arguments.unconverged, "progress": Progress}
@@ -47,37 +47,19 @@ COMMAND = Command(
     "pdrom train bar.yaml --modes 40 --variations 3 --validate 2",
     {
         "scene": SCENE,
-        "runs": {
-            "metavar": "RUN.h5",
-            "nargs": "*",
-            "help": "runs to train on, the first of this scene; made if left out",
-        },
-        "--modes": {"type": int, "default": 40, "help": "POD modes of the displacements (40)"},
-        "--tolerance": {"type": float, "default": 0.01, "help": "of the sampled elements (0.01)"},
-        "--skinning": {"type": int, "default": 0, "help": "skinning columns beside the modes (0)"},
-        "--hold": {
-            "metavar": "SIDE",
-            "nargs": "+",
-            "default": (),
-            "help": "sides that later scenes may hold, beside those that the scene holds",
-        },
-        "--variations": {"type": int, "default": 0, "help": "random variations to train on (0)"},
-        "--validate": {"type": int, "default": 0, "help": "random variations to validate on (0)"},
-        "--error": {
-            "type": float,
-            "help": "choose the smallest of 20, 40, 80 modes within this error in validation",
-        },
-        "--unconverged": {
-            "action": "store_true",
-            "help": "train on frames of the scene's iterations instead of converged ones",
-        },
-        "--method": {
-            "metavar": "M",
-            "help": "reduce the projections of a group instead, by a method of config/methods.yaml",
-        },
-        "--group": {"metavar": "G", "help": "the group; needed if the scene has several"},
-        "--r": {"metavar": "R", "type": int, "default": 20, "help": "their modes (20)"},
-        "--out": {"metavar": "FILE", "help": "file to write (HDF5); SCENE.model.h5 without it"},
+        "runs": text("RUN.h5", "runs to train on, the first of SCENE (else made)", nargs="*"),
+        "--modes": number(40, "POD modes of the displacements"),
+        "--tolerance": number(0.01, "of the sampled elements"),
+        "--skinning": number(0, "skinning columns beside the modes"),
+        "--hold": text("SIDE", "sides that later scenes may hold, too", nargs="+", default=()),
+        "--variations": number(0, "random variations to train on"),
+        "--validate": number(0, "random variations to validate on"),
+        "--error": number(None, "choose the smallest of 20, 40, 80 modes within this error"),
+        "--unconverged": flag("train on frames of the scene's iterations, not on converged ones"),
+        "--method": text("M", "reduce a group's projections by this one of config/methods.yaml"),
+        "--group": text("G", "the group; needed if the scene has several"),
+        "--r": number(20, "their modes"),
+        "--out": text("FILE", "file to write (HDF5); SCENE.model.h5 without it"),
         "--unchecked": UNCHECKED,
     },
     perform,

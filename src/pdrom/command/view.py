@@ -5,14 +5,14 @@ import sys
 import webbrowser
 from pathlib import Path
 
-from pdrom.command.base import UNCHECKED, Command, Status, require_output
+from pdrom.command.base import UNCHECKED, Command, Status, flag, require_output, text
+from pdrom.core.errors import ConfigurationError
 
 
 def perform(arguments: argparse.Namespace) -> Status:
     """Write the page, picture or ParaView files of the runs in ``arguments``; print their paths."""
     from pdrom.api import load, load_model
     from pdrom.api.pictures import viewed_scenes
-    from pdrom.core.errors import ConfigurationError
     from pdrom.view.frames import FRAMES, vtk, write_frames
     from pdrom.view.page import write_page
 
@@ -52,12 +52,12 @@ COMMAND = Command(
     "Write a page on which runs are looked at or a model runs, a picture, or files for ParaView",
     "pdrom view pulled_sheet.h5 pulled.h5 --open",
     {
-        "runs": {"metavar": "RESULT", "nargs": "+", "help": "files of pdrom run"},
-        "--live": {"action": "store_true", "help": "run a model: its file, then a run as wires"},
-        "--out": {"metavar": "FILE", "help": "page to write; the first RESULT as .html"},
-        "--open": {"action": "store_true", "help": "open it in the browser"},
-        "--png": {"metavar": "FILE", "help": "picture of four frames of each run, too"},
-        "--vtk": {"metavar": "FOLDER", "help": "files for ParaView, too: one a frame, and run.pvd"},
+        "runs": text("RESULT", "files of pdrom run", nargs="+"),
+        "--live": flag("run a model: its file, then a run as wires"),
+        "--out": text("FILE", "page to write; the first RESULT as .html"),
+        "--open": flag("open it in the browser"),
+        "--png": text("FILE", "picture of four frames of each run, too"),
+        "--vtk": text("FOLDER", "files for ParaView, too: one a frame, and run.pvd"),
         "--unchecked": UNCHECKED,
     },
     perform,

@@ -35,14 +35,10 @@ _JOB: ContextVar[Mapping[str, str]] = ContextVar("job", default=MappingProxyType
 
 @contextmanager
 def made_by(name: str, configuration: Any, code: str = "", inputs: str = "") -> Iterator[None]:
-    """Context in which the job ``name`` is recorded in all files that are written.
+    """Context in which all files that are written record the job ``name`` (a rule or a function).
 
-    Parameters
-    ----------
-    name : name of a rule of the workflow, or of a function of the package
-    configuration : all settings of the job, hashed as JSON
-    code : fingerprint of the code that the job runs; empty outside of the workflow
-    inputs : hash of the files that the job reads, which files made from them record
+    ``configuration`` are all its settings, hashed as JSON. In the workflow, ``code`` is the
+    fingerprint of the code that the job runs, ``inputs`` a hash of the files that it reads.
     """
     canonical = json.dumps(configuration, sort_keys=True, default=str)
     hashed = hashlib.sha256(canonical.encode()).hexdigest()

@@ -15,7 +15,7 @@ import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -174,8 +174,6 @@ def read_table(
     except (ValueError, OverflowError) as error:
         fault = " ".join(str(error).split())
         raise StorageError(f"{path}: not a readable table ({fault})") from error
-    if not isinstance(table.index, pd.RangeIndex):  # pandas takes surplus cells for row names
-        raise StorageError(f"{path}: not a readable table (its rows have more cells than names)")
     if not content.endswith(b"\n"):
         raise StorageError(f"{path}: the end of its last line is missing")
     missing = [name for name in columns or () if name not in table.columns]
@@ -195,52 +193,24 @@ def require_finite(name: str, array: np.ndarray, error: type[Exception]) -> np.n
 
 @contextmanager
 def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
-    """Yield a new HDF5 file without time stamps; then add a checksum and rename it to ``path``."""
+    """Yield a new HDF5 file without time stamps, in memory; then write it with a checksum."""
     with atomic_path(path, with_checksum=False) as temporary:
-        with open(temporary, "w+b", buffering=0) as handle:
-            sink = _Sink(handle)
-            with h5py.File(sink, "w", track_order=True, userblock_size=sums.BLOCK) as file:
-                file.attrs.update(attributes())
-                yield file
-            if sink.error is not None:
-                raise sink.error
+        memory = _Memory()
+        with h5py.File(memory, "w", track_order=True, userblock_size=sums.BLOCK) as file:
+            file.attrs.update(attributes())
+            yield file
+        temporary.write_bytes(memory.getbuffer())
         sums.write_block(temporary, path)
 
 
-class _Sink:
-    """File object for HDF5 that never reports a failed write.
+class _Memory(io.BytesIO):
+    """File in memory for HDF5, which crashes when the process ends if a disk was full."""
 
-    After a failed write HDF5 cannot close the file, and it crashes when the process ends. So the
-    first error (no space, say) is stored for `write_hdf5` to raise; later writes are discarded.
-    """
-
-    def __init__(self, handle: io.FileIO) -> None:
-        self._handle = handle
-        self.error: OSError | None = None
-        for name in ("read", "seek", "tell", "flush"):
-            setattr(self, name, getattr(handle, name))
-
-    def write(self, data: memoryview) -> int:
-        left = memoryview(data)
-        while len(left) and self.error is None:
-            try:
-                left = left[self._handle.write(left) :]
-            except OSError as error:
-                self.error = error
-        return len(data)
-
-    def readinto(self, buffer: memoryview) -> int:
-        count = self._handle.readinto(buffer)
-        buffer[count:] = bytes(len(buffer) - count)  # zeros for bytes that `write` discarded
-        return len(buffer)
-
-    def truncate(self, size: int) -> int:
-        if self.error is None:
-            try:
-                return self._handle.truncate(size)
-            except OSError as error:
-                self.error = error
-        return size
+    def truncate(self, size: int | None = None) -> int:
+        """Set the file's size; as on a disk, zeros fill a longer file."""
+        if size is not None:
+            self.write(bytes(max(0, size - self.seek(0, io.SEEK_END))))
+        return super().truncate(size)
 
 
 @contextmanager
@@ -263,16 +233,11 @@ def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator
 
 def require_self_contained(file: h5py.File, path: str | os.PathLike[str]) -> None:
     """Raise StorageError if ``file`` (at ``path``) has links, external storage or virtual data."""
-    groups: list[h5py.Group] = [file]
-    seen: set[int] = set()
-    while groups:
-        group = groups.pop()
-        place = h5py.h5o.get_info(group.id).addr
-        for name in group if place not in seen else ():
-            link = group.get(name, getlink=True)
-            item = group[name] if isinstance(link, h5py.HardLink) else None
-            if isinstance(item, h5py.Group):
-                groups.append(item)
-            elif not isinstance(item, h5py.Dataset) or item.is_virtual or item.external:
-                raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")
-        seen.add(place)
+
+    def check(name: str, found: Any) -> None:
+        elsewhere = isinstance(found, h5py.Dataset) and (found.is_virtual or found.external)
+        if elsewhere or not isinstance(found, (h5py.HardLink, h5py.Group, h5py.Dataset)):
+            raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")
+
+    file.visititems_links(check)
+    file.visititems(check)

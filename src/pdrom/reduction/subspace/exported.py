@@ -79,8 +79,9 @@ def require_known(config: SceneConfig) -> None:
         projected = issubclass(effect, StencilGroup) and effect.manifold in MANIFOLDS
         if not (projected or issubclass(effect, (Floor, Pins, Force, Start))):
             allowed = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
+            added = " (added by poisson > 0)" * (name in ("area", "volume"))
             raise SceneError(
-                f"scene '{config.name}': the page's engine has no '{name}'"
+                f"scene '{config.name}': the page's engine has no '{name}'{added}"
                 f"{choices(name, (*allowed, 'floor', 'pins'))}"
             )
     if config.anderson_window:
