@@ -13,7 +13,6 @@ from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import MethodSpec
 from places import CONFIG, ROOT, tracked
 from study.artifact.paths import RESULTS
-from study.figures.stability_map import LOOKS
 from study.pipeline.study import StudySettings
 from study.tables.kit.results import trained
 from study.verification.references import folder_of, read_references
@@ -94,13 +93,6 @@ def test_a_name_that_is_gone_is_found(span: str) -> None:
     assert list(gone(span)) != []
 
 
-def test_every_page_is_listed_in_the_readme_which_is_short() -> None:
-    text = (ROOT / "README.md").read_text("utf-8")
-    pages = {f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md")}
-    assert pages <= set(LINK.findall(text))
-    assert len(text.splitlines()) <= 110
-
-
 def test_the_scene_the_study_and_the_method_that_are_added_are_valid() -> None:
     blocks = re.findall(r"```yaml\n(.*?)```", ADDING.read_text("utf-8"), re.DOTALL)
     scene, study, methods = map(yaml.safe_load, blocks)
@@ -125,26 +117,6 @@ def test_effects_and_selections_are_listed_with_their_keys_and_what_a_subspace_t
     text = ADDING.read_text("utf-8")
     (sentence,) = re.findall(r"^Effects: (.*?)\.\n", text, re.MULTILINE | re.DOTALL)
     assert sorted(re.findall(r"`(\w+)`", sentence)) == sorted(EFFECTS)
-
-
-def test_the_classes_of_runs_are_explained() -> None:
-    text = (ROOT / "docs" / "study.md").read_text("utf-8")
-    table = text.split("## How a run ended")[1].split("##")[0]
-    assert re.findall(r"^\| ([a-z -]+) \| ", table, re.MULTILINE)[1:] == list(LOOKS)
-
-
-def test_the_messages_that_are_explained_exist() -> None:
-    """Their fixed parts; what stands for others is written in capitals or as three dots."""
-    files = [ROOT / "reproduce", ROOT / "workflow" / "Snakefile"]
-    files += (ROOT / "src").rglob("*.py")
-    sources = "\n".join(path.read_text("utf-8") for path in files)
-    sources = re.sub(r'"\s*\n\s*f?"', "", sources)  # a text over several lines
-    page = (ROOT / "docs" / "running.md").read_text("utf-8")
-    page = page.split("## Messages")[1].split("###")[0]
-    messages = re.findall(r"^\| `([^`]+)` \|", page, re.MULTILINE)
-    assert len(messages) > 10
-    fixed = [part.strip() for text in messages for part in re.split(r"\.\.\.|\b[A-Z]+\b", text)]
-    assert [part for part in fixed if part not in sources] == []
 
 
 def test_the_verdicts_of_the_readme_are_the_expected_ones() -> None:

@@ -4,7 +4,6 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter, process_time
 from typing import Annotated, Any, Literal
 
@@ -371,13 +370,12 @@ def load_model(path: str | os.PathLike[str]) -> Model:
             raise StorageError(f"{path}: holds no model (pdrom show says what it holds)")
         if (version := int(file.attrs["format"])) > FORMAT:
             raise StorageError(f"{path}: format {version} of a newer pdrom (allowed: to {FORMAT})")
-        return _model(file, path)
+        return _model(file, json.loads(file.attrs["configuration"])["scene"], str(path))
 
 
-def _model(file: h5py.File, path: Path) -> Model:
-    config = json.loads(file.attrs["configuration"])["scene"]
+def _model(file: h5py.File, config: dict[str, Any], source: str) -> Model:
     mesh, masses = stored_mesh(file["mesh"]), file["masses"][...]
-    scene = Scene.build(validate(SceneConfig, config, str(path)), mesh, masses)
+    scene = Scene.build(validate(SceneConfig, config, source), mesh, masses)
     record, table, own = file["training"], file["validation"], file["model"]
     bounds = [record.attrs.get(name) for name in ("tolerance", "residual")]
     tolerance, residual = (None if bound is None else float(bound) for bound in bounds)

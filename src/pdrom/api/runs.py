@@ -3,7 +3,6 @@
 import logging
 import os
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -92,9 +91,7 @@ def run(
     }
     config = scene.config.model_dump(mode="json")
     reported = {"scene": config, "run": "train", "solver": DEFAULT_SOLVER}
-    with made_by("pdrom.api.run", reported), ExitStack() as kept:
-        # without ``out``, the run is written to a temporary folder that is deleted afterwards
-        folder = "" if out else kept.enter_context(TemporaryDirectory(prefix="pdrom-"))
+    with made_by("pdrom.api.run", reported), TemporaryDirectory(prefix="pdrom-") as folder:
         path = Path(out or Path(folder, "run.h5"))
         with event.install_listener("numba:compile", _Compilation(scene.config.name)) as compiled:
             later = {group: own[own >= len(begun)] for group, own in frames.items()}

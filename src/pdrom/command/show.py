@@ -141,13 +141,11 @@ def _table(path: Path) -> Iterator[str]:
     yield f"{len(table)} rows of {len(table.columns)} columns:"
     for name in table.columns:
         values = table[name].dropna()
-        if not len(values):
-            content = "empty"
-        elif not is_numeric_dtype(values):
-            different = list(dict.fromkeys(map(str, values)))
-            content = ", ".join(different[:4]) + (" ..." if len(different) > 4 else "")
-        else:
+        if is_numeric_dtype(values) and len(values):
             content = f"{values.min():.4g} to {values.max():.4g}"
+        else:
+            different = [*dict.fromkeys(map(str, values))]
+            content = ", ".join([*different[:4], *["..."] * (len(different) > 4)]) or "empty"
         yield f"  {name}: {content}"
 
 

@@ -2,40 +2,25 @@
 
 import os
 import platform
+import re
 import subprocess
-from importlib import import_module
 from pathlib import Path
+from typing import Any
 
+import numpy.linalg  # noqa: F401 loads a linear algebra library
+import scipy.linalg  # noqa: F401 loads another one
 from threadpoolctl import threadpool_info
 
 from pdrom import __version__
 from pdrom.core.provenance import library_versions
 from pdrom.core.yamlfile import ConfigModel
 
-# modules whose import loads the linear algebra libraries; NumPy and SciPy each bring their own
-LINEAR_ALGEBRA = ("numpy.linalg", "scipy.linalg")
-
-
-class Kernels(ConfigModel):
-    """A linear algebra or threading library that is loaded in this process.
-
-    file : name of the shared library
-    kind : "blas" or "openmp"
-    architecture : processor that its kernels are written for; None if the library does not tell
-    """
-
-    file: str
-    kind: str
-    library: str
-    version: str | None
-    architecture: str | None
-    threads: int
-
 
 class Machine(ConfigModel):
     """Machine and code that produced the results; timings and last digits depend on both.
 
     threads : largest number of threads that one of the libraries would use
+    kernels : linear algebra and threading libraries in the process, see `loaded_kernels`
     target : processor that the project's code is compiled for; empty leaves it to the compiler
     """
 
@@ -47,7 +32,7 @@ class Machine(ConfigModel):
     commit: str
     threads: int
     libraries: dict[str, str]
-    kernels: tuple[Kernels, ...]
+    kernels: tuple[dict[str, Any], ...]
     target: str = ""
 
 
@@ -57,42 +42,39 @@ def machine() -> Machine:
     return Machine(
         cpu=_cpu_model(), cores=os.cpu_count(), python=platform.python_version(),
         system=f"{platform.system()} {platform.machine()}", pdrom=__version__, commit=_commit(),
-        threads=max((each.threads for each in kernels), default=1), libraries=library_versions(),
+        threads=max((each["threads"] for each in kernels), default=1), libraries=library_versions(),
         kernels=kernels, target=os.environ.get("NUMBA_CPU_NAME", ""),
     )  # fmt: skip
 
 
-def loaded_kernels() -> tuple[Kernels, ...]:
-    """Linear algebra and threading libraries in this process, sorted by file."""
-    for module in LINEAR_ALGEBRA:
-        import_module(module)
+def loaded_kernels() -> tuple[dict[str, Any], ...]:
+    """Linear algebra and threading libraries in this process, sorted by the name of their file.
+
+    ``kind`` is "blas" or "openmp"; ``architecture`` is the processor that the kernels are written
+    for, None if the library does not tell.
+    """
     found = [
-        Kernels(
-            file=Path(pool["filepath"]).name, kind=pool["user_api"], library=pool["internal_api"],
-            version=pool["version"], architecture=pool.get("architecture"),
-            threads=pool["num_threads"],
-        )
+        {
+            "file": Path(pool["filepath"]).name, "kind": pool["user_api"],
+            "library": pool["internal_api"], "version": pool["version"],
+            "architecture": pool.get("architecture"), "threads": pool["num_threads"],
+        }
         for pool in threadpool_info()
     ]  # fmt: skip
-    return tuple(sorted(found, key=lambda each: each.file))
+    return tuple(sorted(found, key=lambda each: each["file"]))
 
 
 def _cpu_model() -> str:
     info = Path("/proc/cpuinfo")
-    if info.is_file():
-        for line in info.read_text().splitlines():
-            if line.lower().startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or "unknown"
+    found = re.search(r"(?mi)^model name.*?: *(.*)", info.read_text() if info.is_file() else "")
+    return found[1].strip() if found else platform.processor() or "unknown"
 
 
 def _commit() -> str:
     """Git commit of the checkout that contains the package; "unknown" without a checkout."""
-    command = ["git", "rev-parse", "--short=12", "HEAD"]
+    command = ["git", "-C", str(Path(__file__).parent), "rev-parse", "--short=12", "HEAD"]
     try:
-        done = subprocess.run(
-            command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10
-        )
-    except (OSError, subprocess.TimeoutExpired):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
         return "unknown"
-    return done.stdout.strip() if done.returncode == 0 else "unknown"
+    return done.stdout.strip()

@@ -205,11 +205,9 @@ def _scene_name(name: str) -> str:
 
 def check_lengths(path: str) -> None:
     """Raise ValueError if ``path`` exceeds `MAX_PATH` bytes or a name in it `MAX_NAME` bytes."""
-    if len(os.fsencode(path)) > MAX_PATH:
-        raise ValueError(f"a path of at most {MAX_PATH} bytes is required")
-    for name in PurePath(path).parts:
-        if len(os.fsencode(name)) > MAX_NAME:
-            raise ValueError(f"names of at most {MAX_NAME} bytes are required")
+    for name, most in ((path, MAX_PATH), *((part, MAX_NAME) for part in PurePath(path).parts)):
+        if len(os.fsencode(name)) > most:
+            raise ValueError(f"paths of {MAX_PATH} bytes and names of {MAX_NAME} at most")
 
 
 def named(keys: Any, stem: str) -> Any:

@@ -127,7 +127,8 @@ def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
         raise StorageError(f"{machine}: {describe(error, Record)}") from error
     row = record.model_dump(exclude={"libraries", "kernels", "units"})
     row |= {f"version_{name}": version for name, version in record.libraries.items()}
-    row["kernels"] = ", ".join(sorted({k.architecture for k in record.kernels if k.architecture}))
+    architectures = {each["architecture"] for each in record.kernels} - {None}
+    row["kernels"] = ", ".join(sorted(architectures))
     row |= {**record.units.model_dump(), "unit_s": record.units.unit_s}
     # names of processor and system may contain characters that TeX cannot typeset
     words = {key: replaced(value) for key, value in row.items() if isinstance(value, str)}

@@ -107,8 +107,8 @@ def _require_file(target: Path) -> None:
     except OSError as error:
         raise StorageError(f"{target}: cannot be written ({reason(error)})") from error
     if not stat.S_ISREG(mode):
-        kinds = {stat.S_ISDIR: "a folder", stat.S_ISLNK: "a link; name the file itself"}
-        kind = next((words for test, words in kinds.items() if test(mode)), "no regular file")
+        link = "a link; name the file itself" if stat.S_ISLNK(mode) else "no regular file"
+        kind = "a folder" if stat.S_ISDIR(mode) else link
         raise StorageError(f"{target}: cannot be written ({kind})")
 
 
@@ -167,8 +167,6 @@ def read_table(
     try:
         content = Path(path).read_bytes()
         table = pd.read_csv(io.BytesIO(content))
-    except FileNotFoundError as error:
-        raise StorageError(f"{path}: no such file") from error
     except OSError as error:
         raise StorageError(f"{path}: cannot be read ({reason(error)})") from error
     except (ValueError, OverflowError) as error:
@@ -234,10 +232,10 @@ def open_hdf5(path: str | os.PathLike[str], unchecked: bool = False) -> Iterator
 def require_self_contained(file: h5py.File, path: str | os.PathLike[str]) -> None:
     """Raise StorageError if ``file`` (at ``path``) has links, external storage or virtual data."""
 
-    def check(name: str, found: Any) -> None:
+    def outside(name: str, found: Any) -> str | None:
         elsewhere = isinstance(found, h5py.Dataset) and (found.is_virtual or found.external)
-        if elsewhere or not isinstance(found, (h5py.HardLink, h5py.Group, h5py.Dataset)):
-            raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")
+        inside = isinstance(found, (h5py.HardLink, h5py.Group, h5py.Dataset)) and not elsewhere
+        return None if inside else name
 
-    file.visititems_links(check)
-    file.visititems(check)
+    if name := file.visititems_links(outside) or file.visititems(outside):
+        raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")

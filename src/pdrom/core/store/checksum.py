@@ -173,14 +173,7 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
     Raises StorageError if the file is missing, cannot be read, is damaged or (if not ``unchecked``)
     has no checksum, or a job of the workflow (`damaged_set_aside`) reads another file than its own.
     """
-    path = Path(path)
-    try:
-        condition = check_file(path)
-    except StorageError as error:
-        unusable = not path.is_file() or not os.access(path, os.R_OK)
-        if sets_aside() and unusable and os.path.lexists(path):
-            raise _set_aside(path, "damaged, no file that can be read") from error
-        raise
+    path, condition = Path(path), check_file(path)
     if condition is Condition.INTACT and sets_aside():
         told = read_checksum(path)
         if told and told.file != os.path.normpath(path):

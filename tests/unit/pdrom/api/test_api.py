@@ -7,7 +7,6 @@ import re
 from dataclasses import fields, replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from numba import njit
@@ -17,8 +16,7 @@ from pdrom import api
 from pdrom.api.pictures import viewed_scenes
 from pdrom.api.records import Snapshots
 from pdrom.api.runs import Basis, FrameReport, run_full_order
-from pdrom.core.errors import ConfigurationError, PdromError, StorageError
-from pdrom.core.store import write_hdf5
+from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
@@ -67,7 +65,6 @@ def test_the_page_has_every_name_and_no_function_more():
         own = {field.name for field in fields(kind)}
         own |= {n for n, v in inspect.getmembers(kind) if kind is not Scene or not callable(v)}
         assert {name for name in own if name[0] != "_"} <= set(re.findall(r"`(\w+)`", row)), row
-    assert dir(api) == sorted(api.__all__)
 
 
 def test_a_run_is_that_of_the_step_loop(full):
@@ -90,31 +87,13 @@ def test_a_run_logs_how_long_it_compiles_kernels(full, monkeypatch, caplog):
     assert re.fullmatch(r"scene: kernels compiled in \d+\.\d s", last)
 
 
-TOP = {"select": "top", "over": 4}
-INTO_A_BALL = {
-    "translate": {"effect": "translate", "offset": [0, 0, 0.6], **TOP},
-    "rotate": {"effect": "rotate", "axis": "y", "degrees": 90, **TOP},
-    "keyframes": {
-        "effect": "keyframes", "select": "top",
-        "keys": [{"at": 2, "offset": [0, 0, 0.6]}, {"at": 4}],
-    },
-    "poke": {"effect": "poke", "amplitude": 0.6, "over": 8, "count": 1, "avoid": ["top", "bottom"]},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", INTO_A_BALL)
-def test_a_run_warns_of_held_vertices_that_enter_an_obstacle(name, caplog):
-    ball = {"effect": "sphere", "centre": [0, 2.25, 0.6], "radius": 0.4}
-    effects = [INTO_A_BALL[name], ball, {"effect": "spring", "weight": 1e5}]
-    api.run(api.build_scene(effects=effects, mesh={"kind": "cloth"}, frames=9))
-    assert "held vertices have targets inside 'sphere' and stay there" in caplog.text
-
-
 def test_files_are_read_back(full, reduced, tmp_path):
     blown = replace(reduced, positions=full.positions[:4], ms=full.ms[:3], blowup_frame=3)
     for run in (full, reduced, blown):
         api.save(run, tmp_path / "run.h5")
+        api.save(api.load(tmp_path / "run.h5"), tmp_path / "run.h5")
         read = api.load(tmp_path / "run.h5")
+        assert np.array_equal(read.frame_error, run.frame_error, equal_nan=run is full)
         assert (read.method, read.blowup_frame) == (run.method, run.blowup_frame)
         assert np.array_equal(read.positions, run.positions)
         assert np.array_equal(read.ms, run.ms)
@@ -161,35 +140,22 @@ FAULTY = {
     "no snapshots": (lambda full, _: spring(replace(full, snapshots={})), "stored no snapshots"),
     "mesh not there": (lambda _, p: given({"kind": "file", "path": "x.obj"}, folder=p), r"x\.obj"),
     "positions cut": (lambda full, _: replace(full, positions=full.positions[:-1]), "positions of"),
-    "mesh no pair": (lambda *_: given((1, 2, 3)), "mesh of 3 parts"),
-    "r a fraction": (lambda full, _: spring(full, r=1.5), "r = 1.5: Input should be a val"),
-    "r zero": (lambda full, _: spring(full, r=0), "r = 0: Input should be greater"),
+    "r zero": (lambda full, _: spring(full, r=0), "train: r = 0"),
     "no run": (lambda full, _: api.train(full.scene), "full = Scene.*a Run is"),
     "basis of a triangle": (lambda full, _: api.train(full, basis=np.eye(3)), "basis: float64"),
     "basis NaN": (
         lambda full, _: api.train(full, basis=np.full((30, 2), np.nan)), "basis: entry .* is nan",
     ),
-    "error of a scene": (lambda *_: given((SQUARE, HALVES), requested_error=1), "unknown key"),
     "plot of a run": (lambda full, _: api.plot(full), "at least one run"),
-    "view of nothing": (lambda _, p: api.view(p / "v"), "view"),
-    "view into a folder": (lambda full, p: api.view(p, full), "cannot be written .a folder"),
-    "load of a folder": (lambda _, p: api.load(p), "is a folder"),
     "run into a folder": (lambda full, p: api.run(full.scene, p), "cannot be written .a folder"),
-    "scene a folder": (lambda _, p: api.load_scene(p), "a folder, name a file in it"),
     "mass NaN": (lambda *_: given((SQUARE, HALVES), vertex_mass=np.nan), "vertex_mass"),
     "mesh nothing": (lambda *_: given(None), "key 'mesh' is"),
     "corner beyond": (lambda *_: given((SQUARE, [[0, 1, 4]])), "names vertex"),
-    "corner below": (lambda *_: given((SQUARE, [[0, 1, -1]])), "names vertex"),
     "corner of 65 bits": (lambda *_: given((SQUARE, np.uint64([[0, 1, 2**63]]))), "names vertex"),
-    "corner of 41 bits": (lambda *_: given((SQUARE, [[0, 1, 2**40]])), "names vertex"),
-    "vertex left": (lambda *_: given((SQUARE, HALVES[:1])), "in no element"),
     "cells of floats": (lambda *_: given((SQUARE, [[0.0, 1.0, 2.0]])), "cells: an array"),
     "cells of edges": (lambda *_: given((SQUARE, [[0, 1]])), r"required: \(n, 3\) or \(n, 4\)"),
-    "no cells": (lambda *_: given((SQUARE, [])), "cells of shape"),
     "empty cells": (lambda *_: given((SQUARE, np.empty((0, 3), int))), "both are required"),
-    "points of a plane": (lambda *_: given((np.eye(3)[:, :2], HALVES)), "points of shape"),
     "points NaN": (lambda *_: given((np.array(SQUARE) * np.nan, HALVES)), "vertex 0 lies at"),
-    "points nothing": (lambda *_: given((None, None)), "points of shape"),
     "ragged points": (lambda *_: given(([[0.0], [1.0, 2.0]], HALVES)), "points: an array"),
 }  # fmt: skip
 
@@ -246,33 +212,6 @@ def test_scenes_and_runs_are_copied_and_pickled(full, reduced):
         assert np.array_equal(one.run(full.scene).positions, model.run(full.scene).positions)
 
 
-def test_representations_are_one_line(full):
-    made, model = api.basis(full, "spring"), api.train(full, method="pod", r=2)
-    shown = [
-        (full, "Run(Scene('scene', 30 vertices, 12 frames: gravity, pins, spring), full order, "),
-        (full.scene, "Scene('scene', 30 vertices"),
-        (full.scene.mesh, "Mesh(points=<30 x 3 float64>"),
-        (full.snapshots["spring"], "Snapshots(p=<6 x "),
-        (
-            model,
-            "Model(a model of 'scene' (spring, POD projection, r = 2, gain 1, 69 of 69 elements)",
-        ),
-        (made, "Basis(V=<"),
-    ]
-    for value, words in shown:
-        assert repr(value).startswith(words)
-        assert len(repr(value).splitlines()) == 1
-        assert len(repr(value)) < 400
-
-
-@pytest.mark.parametrize("name", [n for n in api.__all__ if n[0].islower()])
-def test_docstrings_tell_every_argument(name):
-    function = getattr(api, name)
-    told = inspect.getdoc(function).split("Parameters\n")[-1]
-    for argument in inspect.signature(function).parameters:
-        assert f"\n{argument} : " in told
-
-
 def test_a_picture_has_a_line_for_each_run_and_a_cross_for_a_blow_up(full, reduced):
     blown = replace(reduced, positions=full.positions[:8], ms=full.ms[:7], blowup_frame=7)
     (axes,) = api.plot(full, reduced, blown).axes
@@ -298,12 +237,3 @@ def test_records_are_compared_and_hashed_by_identity(reduced):
     assert reduced == reduced
     assert reduced != replace(reduced)
     assert len({reduced, reduced.scene}) == 2
-
-
-def test_a_run_from_elsewhere_reads_no_other_file(reduced, tmp_path):
-    api.save(reduced, tmp_path / "one.h5")
-    path = tmp_path / "two.h5"
-    with write_hdf5(path) as file:
-        file["positions"] = h5py.ExternalLink(str(tmp_path / "one.h5"), "/positions")
-    with pytest.raises(StorageError, match="leads elsewhere"):
-        api.load(path)

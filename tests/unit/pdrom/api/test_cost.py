@@ -84,14 +84,9 @@ def test_a_body_that_is_rigid_or_blows_up_has_no_such_errors_one_at_rest_no_tabl
 
 
 def test_a_grid_that_an_effect_does_not_suit_is_left_out(caplog):
-    x, y, z = sheet(size=13).mesh.points[
-        6 + 13
-    ]  # no vertex of the grid with a quarter of the cells
-    box = {
-        "kind": "box",
-        "lower": [x - 0.01, y - 1.0, z - 0.01],
-        "upper": [x + 0.01, y + 1.0, z + 0.01],
-    }
+    place = sheet(size=13).mesh.points[6 + 13]  # none of the grid with a quarter of the cells
+    near = np.array([0.01, 1.0, 0.01])
+    box = {"kind": "box", "lower": list(place - near), "upper": list(place + near)}
     table = api.cost(sheet(GRAVITY, SPRING, {"effect": "pins", "select": box}, size=13, frames=2))
     assert set(table.vertices) < {169, 49, 25, 16}
     assert "times the cells a side: scene 'test', effect 'pins': selection" in caplog.text
@@ -121,6 +116,6 @@ def test_files_are_read_as_the_mesh_of_the_scene(tmp_path):
 def test_wrong_arguments_and_frames_that_do_not_converge_are_refused(given, fault, monkeypatch):
     with pytest.raises(PdromError, match=fault):
         api.cost(sheet(), **given)
-    monkeypatch.setattr(MODULE, "EVALUATIONS", 2)
+    monkeypatch.setattr("pdrom.api.training.EVALUATIONS", 2)
     with pytest.raises(SolverError, match="scene 'test': a frame does not converge"):
         api.cost(sheet())

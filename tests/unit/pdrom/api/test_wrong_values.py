@@ -97,13 +97,10 @@ def use(run: Any) -> None:
 def test_a_field(known, tmp_path, monkeypatch, capfd, kind):
     monkeypatch.chdir(tmp_path)
     full = known["full"]
-    record, tried = {
-        "run": (full, use),
-        "snapshots": (
-            full.snapshots["spring"],
-            lambda s: use(replace(full, snapshots={"spring": s})),
-        ),
-    }[kind]
+    record, tried = full, use
+    if kind == "snapshots":
+        record = full.snapshots["spring"]
+        tried = lambda own: use(replace(full, snapshots={"spring": own}))  # noqa: E731
     for field in fields(record):
         right, spoilt = np.array(getattr(record, field.name)), ()
         if right.dtype.kind == "f":

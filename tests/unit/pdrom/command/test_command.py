@@ -33,7 +33,7 @@ from pdrom.model.mesh.config import BarMesh, ClothMesh, MeshFile
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.reader import READERS
 from pdrom.model.mesh.selection import Shape
-from pdrom.model.mesh.types import Mesh, vertex_measures
+from pdrom.model.mesh.types import vertex_measures
 from pdrom.model.runs import converged_run, trajectory
 from pdrom.model.scene import HeldOut, MassConfig, ReductionPlan, Scene, SceneConfig
 from pdrom.view.camera import up_of
@@ -75,6 +75,7 @@ def test_a_scene_is_run_a_model_trained_and_run_and_all_is_shown(folder, capsys)
     capsys.readouterr()
     assert run(["show", "small.yaml"]) == run(["show", "small.model.h5"]) == Status.DONE
     shown = capsys.readouterr().out
+    assert shown.count("iterations: 10\neffects:\n  gravity: ") == 2
     assert shown.count("  spring: weight 100000.0 N/m\n") == 2
     for words in ("intact", "model/columns/B: 30 x", "format: 1", "scene: small"):
         assert words in shown
@@ -136,13 +137,10 @@ def test_a_file_of_others_is_never_moved_changed_or_removed(folder, name, capsys
 
 
 def test_a_damaged_run_is_refused_and_left_where_it_is(folder, finished, capsys):
-    damaged = bytearray((finished / "small.h5").read_bytes())
-    damaged[5000] ^= 1
-    Path("small.h5").write_bytes(damaged)
+    Path("small.h5").write_bytes((finished / "small.h5").read_bytes() + b"more")
     before = content(folder)
-    damage = "small.h5: damaged, its content and its checksum differ"
     for arguments in reads_of("small.h5")[:3]:
-        assert damage in refusal(capsys, arguments)
+        assert "small.h5: damaged" in refusal(capsys, arguments)
     assert content(folder) == before
 
 
@@ -248,14 +246,6 @@ def test_a_new_scene_tells_of_its_mesh_and_runs(folder, capsys, caplog):
     assert not (folder / "other.yaml").exists()
 
 
-def test_a_mesh_without_a_whole_side_is_held_at_its_top(folder):
-    points = np.array([[0, 0, 0], [3, 1, 0], [1, 3, 0.5], [2, 2, 3], [4, 4, 4]], dtype=float)
-    mesh = Mesh(points, np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4]]))
-    scene = SceneConfig.model_validate(yaml.safe_load(template("a", "a.obj", mesh)))
-    built = Scene.build(scene, mesh)
-    assert built.boundaries[0].vertices.tolist() == [2, 3, 4]
-
-
 @pytest.mark.parametrize("mesh", [cloth(4, 3, "xz", extent=200.0), bar(3, 2, 2, extent=0.01)])
 @pytest.mark.parametrize("up", [0, 1, 2])
 def test_a_new_scene_has_a_material_and_lengths_of_its_mesh_and_its_floor_is_below(up, mesh):
@@ -330,29 +320,20 @@ FAULTY = [
     (["run", "none.yaml"], "none.yaml: no such configuration file"),
     (["show", "none.h5"], "none.h5: no such file"),
     (["show", "sprng"], "did you mean 'spring'?"),
-    (["train", "small.yaml", "--group", "sprin"], "no group 'sprin'"),
-    ([*TRAIN[:-2], "--method", "gapy"], "did you mean 'gappy'"),
     (["new", "nowhere/x"], "No such file"),
-    (["show", "a" * 5000], "File name too long"),
     (["show", "."], "is a folder"),
     (["run", "folder.h5"], "folder.h5: this is a result: `pdrom show folder.h5`"),
     (["run", "."], ".: a folder, name a file in it"),
-    ([*TRAIN, "--out", "."], ".: cannot be written (a folder)"),
     ([*TRAIN, "--out", "small.yaml"], "is read by this command"),
     (["run", "small.yaml", "--compare", "small.h5"], "--compare: only of runs with a model"),
     (["train", "small.yaml", "--modes", "4", "--r", "3"], "r: no effect without group or method"),
     (["run", "small.yaml", "--model", "none.h5"], "none.h5: no such file"),
     (["run", "small.yaml", "--frame", "3"], "--frame: only with --from"),
     (["run", "small.yaml", "--from", "x.h5", "--model", "x.h5"], "only of runs in full order"),
-    (["run", "small.yaml", "--frame", "2", "--model", "x.h5"], "only of runs in full order"),
     (["run", "small.yaml", "--from", "small.h5"], "is read by this command"),
     (["run", "small.yaml", "--model", "none.h5", "--check"], "--check: only of runs in full"),
-    (["run", "small.yaml", "--model", "x.h5", "--out", "x.h5"], "is read by this command"),
     (["run", "small.yaml", "--out", "."], ".: cannot be written (a folder)"),
-    (["run", "small.yaml", "--out", "small.yaml"], "is read by this command"),
-    (["run", "small.yaml", "--out", "a" * 5000], "File name too long"),
     (["view", "x.h5", "--png", "x.h5"], "is read by this command"),
-    (["view", "x.h5", "--out", "."], ".: cannot be written (a folder)"),
 ]
 
 
@@ -368,25 +349,6 @@ def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, c
         for command in (["run", scene], ["train", scene, "none.h5"]):
             assert f"{out}: {words}" in refusal(capsys, [*command, "--out", out])
         assert Path(out).read_bytes() == before
-
-
-def test_what_pdrom_has_written_it_writes_again_and_leaves_no_hidden_file(folder, capsys):
-    for _ in range(2):
-        assert run(["run", "small.yaml"]) == Status.DONE
-        assert run(["view", "small.h5"]) == Status.DONE
-        assert run([*TRAIN, "small.h5"]) == Status.DONE
-    assert capsys.readouterr().err.count("pdrom:") == 0
-    assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
-
-
-def test_a_deleted_working_folder_is_one_line(tmp_path, monkeypatch, capsys):
-    gone = tmp_path / "gone"
-    gone.mkdir()
-    monkeypatch.chdir(gone)
-    gone.rmdir()
-    told = refusal(capsys, ["show", "x.h5"])
-    assert told.startswith("pdrom: the working folder is not there any more")
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.mark.parametrize(("arguments", "words"), FAULTY)
@@ -452,24 +414,15 @@ def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    "arguments",
-    [
-        [],
-        ["trian"],
-        ["reduce"],
-        ["run"],
-        ["train", "x", "--r", "a"],
-        ["train", "x", "--group", "g", "--modse"],
-    ],
-)
-def test_what_is_not_understood_has_code_2(arguments, capsys):
+    ("arguments", "meant"),
+    [("", ""), ("trian", "'train'"), ("run", ""), ("train x --r a", ""),
+     ("train x --group g --modse", "'--modes'")],
+)  # fmt: skip
+def test_what_is_not_understood_has_code_2(arguments, meant, capsys):
     with pytest.raises(SystemExit) as caught:
-        run(arguments)
+        run(arguments.split())
     assert caught.value.code == 2
-    said = capsys.readouterr().err
-    assert "--modse" not in arguments or "did you mean '--modes'?" in said
-    assert "trian" not in arguments or "did you mean 'train'?" in said
-    assert "reduce" not in arguments or "`pdrom train --method`" in said
+    assert meant in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -490,13 +443,6 @@ def test_an_interrupt_is_said(folder, monkeypatch, capsys):
     monkeypatch.setattr("pdrom.api.run", interrupted)
     assert run(["run", "small.yaml"]) == 130
     assert capsys.readouterr().err == "\npdrom: interrupted\n"
-
-
-def test_a_page_without_a_browser_is_opened_by_hand(folder, finished, monkeypatch, capsys):
-    monkeypatch.setattr("webbrowser.open", lambda _: False)
-    shutil.copy(finished / "small.h5", folder)
-    assert run(["view", "small.h5", "--open"]) == Status.DONE
-    assert capsys.readouterr().err == "pdrom: no browser was found; open the file by hand\n"
 
 
 def test_the_module_is_the_program(tmp_path):

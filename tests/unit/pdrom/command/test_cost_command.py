@@ -58,7 +58,6 @@ def test_the_table_marks_the_best_and_says_what_is_missing():
     ("options", "fault"),
     [
         ("--coarser none.obj", "none.obj: no such mesh file"),
-        ("--coarser scenes/small.yaml", "scenes/small.yaml: of another format"),
         ("--model none.h5", "none.h5: no such file"),
         ("--plot cost", "--plot cost: the name of a picture ends in .png"),
         ("--plot taken.png", "taken.png: cannot be written"),

@@ -2,9 +2,7 @@
 
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
-from unittest.mock import Mock
 from xml.etree import ElementTree
 
 import h5py
@@ -15,16 +13,10 @@ from PIL import Image
 
 from builders import SMALL
 from pdrom.api import load
-from pdrom.api.pictures import viewed_scenes
 from pdrom.command.base import Status
 from pdrom.command.main import run
 from pdrom.core.errors import StorageError
 from pdrom.core.store.checksum import write_block
-from pdrom.model.effects.forces import Gravity
-from pdrom.model.effects.obstacle import Sphere
-from pdrom.view import mesh_render
-from pdrom.view.camera import rotation_to
-from pdrom.view.frames import write_frames
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +46,6 @@ def test_a_run_of_an_earlier_version_which_stored_a_requested_error_is_read(runs
     assert load(path).scene.config == load(runs / "small.h5").scene.config
 
 
-def test_no_page_is_written_under_the_name_of_a_picture(runs, tmp_path, capsys):
-    assert run(["view", files(runs)[0], "--out", str(tmp_path / "p.png")]) == Status.FAULTY
-    assert "p.png: the name of a page ends in .html" in capsys.readouterr().err
-
-
 def test_the_page_the_picture_and_the_files_for_paraview_have_all_runs(runs, tmp_path, capsys):
     out = ["--out", str(tmp_path / "p.html"), "--png", str(tmp_path / "p.png")]
     assert run(["view", *files(runs), *out, "--vtk", str(tmp_path / "vtk")]) == Status.DONE
@@ -73,19 +60,6 @@ def test_the_page_the_picture_and_the_files_for_paraview_have_all_runs(runs, tmp
     assert np.array_equal(last.points, full.positions[-1])
     assert {name.split(" ")[0] for name in last.point_data} == {"displacement", "a"}
     assert [path.name for path in tmp_path.rglob(".*")] == []
-
-
-def test_a_picture_is_upright_and_has_the_obstacles(runs, tmp_path, monkeypatch):
-    turn, drawn = rotation_to(np.array([0.0, 0.0, 1.0])), []
-    monkeypatch.setattr(mesh_render, "draw_surface", lambda *a, **_: drawn.append(a) or Mock())
-    (scene,) = viewed_scenes(load(files(runs)[0]))
-    gravity = Gravity.Config(acceleration=(0.0, 0.0, -9.81))
-    effects = (gravity, Sphere.Config(centre=(0.0, 0.0, 1.6), radius=0.4))
-    turned = replace(scene, effects=effects, positions=scene.positions @ turn.T)
-    write_frames(turned, tmp_path / "p.png")
-    (_, sphere, *_), *_, (_, last, *_) = drawn
-    assert sphere.mean(axis=0) == pytest.approx([0.0, 1.6, 0.0], abs=1e-6)
-    assert last == pytest.approx(scene.positions[-1], abs=1e-6)
 
 
 def test_files_for_paraview_replace_and_remove_only_their_own(runs, tmp_path, capsys):
@@ -117,38 +91,24 @@ def shortened(*names):
     return lambda file: [file.__setitem__(name, file.pop(name)[:-1]) for name in names]
 
 
-SHORT = r"positions of float64 \(12, 30, 3\), required: float \(13, 30, 3\)"
-
-
 AT = "snapshots/spring/frames"
 
 
 @pytest.mark.parametrize(
     ("name", "change", "words"),
     [
-        ("small", shortened("positions"), SHORT),
+        ("small", shortened("positions"), r"positions of float64 \(12, 30, 3\)"),
         ("small", first_of("positions", np.nan), r"positions: entry \(0, 0, 0\) is nan"),
         ("small", shortened("timings"), "11 of 12 frames"),
         ("small", first_of("snapshots/spring/p", np.nan), "snapshots of spring: entry"),
-        ("small", first_of("snapshots/spring/roundoff", np.nan), "round-off of spring"),
         ("small", lambda file: file.attrs.modify("configuration", "{"), "holds no sound run"),
-        ("small", lambda file: file.attrs.modify("configuration", "[]"), "holds no sound run"),
         ("small", lambda file: file["mesh"].pop("points"), "points"),
-        ("small_small", shortened("positions"), SHORT),
         ("small_small", first_of("mesh/triangles", 999), "triangle 0 names vertex"),
-        # attribute of a file in which an earlier pdrom stored a run within a requested error
-        ("small", lambda file: file.attrs.modify("requested_error", 0.05), "earlier pdrom"),
         ("small", first_of("positions", 5.0), "frame 0 of the"),
-        *(("small", first_of("velocities", v), "velocities are not") for v in (1.0, np.inf)),
-        ("small", shortened("velocities"), "velocities are not"),
-        ("small", shortened("objective"), r"objective of shape \(11, 10\)"),
         ("small", first_of("timings", -1e9), "a time is below zero"),
-        *(("small", first_of(AT, n), "spring: frames") for n in (-1, 2, 99)),
-        ("small", shortened(AT), "spring: frames"),
-        ("small", lambda f: f["snapshots/spring"].attrs.modify("elements", 7), r"rows \[7, 1\]"),
+        ("small", shortened("frame_error"), "frame_error of"),
+        *(("small", first_of(AT, n), "spring: frames") for n in (-1, 99)),
         ("small_small", lambda f: f.attrs.modify("blowup_frame", 3), "blow-up in frame 3"),
-        ("small_small", lambda f: f.attrs.modify("method", ""), "method"),
-        ("small_small", lambda f: f.create_group("reduced").parent.create_group("full"), "earlier"),
     ],
 )
 def test_a_right_checksum_does_not_make_a_run_sound(runs, tmp_path, name, change, words):

@@ -45,15 +45,3 @@ def test_a_record_holds_the_declared_keys_and_ends_with_its_job():
     assert set(provenance.RECORD) - set(provenance.provenance()) == {
         "made_by", "configuration_sha256", "code_sha256",
     }  # fmt: skip
-
-
-def test_versions_are_those_installed_and_absent_ones_are_said(monkeypatch):
-    monkeypatch.setattr(provenance, "LIBRARIES", ("numpy", "no-such-library"))
-    provenance.library_versions.cache_clear()
-    try:
-        assert provenance.library_versions() == {
-            "numpy": version("numpy"),
-            "no-such-library": "absent",
-        }
-    finally:
-        provenance.library_versions.cache_clear()

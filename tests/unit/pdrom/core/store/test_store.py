@@ -154,8 +154,7 @@ def test_a_file_that_reads_others_is_refused(tmp_path, kind):
         elif kind == "soft":
             inside["x"] = h5py.SoftLink("/nowhere")
         elif kind == "storage":
-            external = [(str(tmp_path / "raw"), 0, 32)]
-            inside.create_dataset("x", (4,), "f8", external=external)
+            inside.create_dataset("x", (4,), "f8", external=[(str(tmp_path / "raw"), 0, 32)])
         else:
             layout = h5py.VirtualLayout((4,), "f8")
             layout[:] = h5py.VirtualSource(str(other), "x", (4,))
@@ -192,7 +191,7 @@ def test_table_round_trip(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "no such file"),
+        (None, "cannot be read"),
         (b"", "not a readable table"),
         (b"a,b\n1,2\n1,2,3\n", "not a readable table"),
         (b"a,b\n\xff\xfe,2\n", "not a readable table"),
