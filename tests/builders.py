@@ -46,16 +46,8 @@ def make_scene(
     *effects: dict, mesh: dict | None = None, frames: int = 20, **settings: object
 ) -> Scene:
     """Scene of the given effects on a small mesh."""
-    config = SceneConfig.model_validate(
-        {
-            "name": "test",
-            "title": "test",
-            "mesh": mesh or {"kind": "cloth", "rows": 6, "columns": 5},
-            "frames": frames,
-            "effects": list(effects),
-            **settings,
-        }
-    )
+    keys = {"name": "test", "title": "test", "mesh": mesh or GROUPS["spring"], "frames": frames}
+    config = SceneConfig.model_validate({**keys, "effects": list(effects), **settings})
     return Scene.build(config, config.mesh.build(ROOT))
 
 

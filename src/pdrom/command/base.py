@@ -52,9 +52,7 @@ SCENE = text("SCENE.yaml", "file of the scene")
 UNCHECKED = flag("read a run without a checksum inside (by an older pdrom) if it is sound")
 
 
-def require_output(
-    path: str | Path, reads: Sequence[str | Path], scene: "Scene | None" = None
-) -> None:
+def require_output(path: str | Path, reads: Sequence[str], scene: "Scene | None" = None) -> None:
     """Refuse an output ``path`` that is one of the files ``reads``, or that pdrom may not write.
 
     The first of ``reads`` is the file of the ``scene``; its mesh file is read, too.
@@ -63,7 +61,7 @@ def require_output(
     from pdrom.model.mesh.config import MeshFile
 
     if scene and isinstance(scene.config.mesh, MeshFile):
-        reads = [*reads, scene.config.mesh.file(Path(reads[0]).parent)]
+        reads = [*reads, str(scene.config.mesh.file(Path(reads[0]).parent))]
     if any(Path(path).resolve() == Path(read).resolve() for read in reads):
         raise StorageError(f"{path}: would be overwritten, and is read by this command")
     require_own(path)

@@ -32,13 +32,11 @@ def perform(arguments: argparse.Namespace) -> Status:
     ):
         if wrong:
             raise ConfigurationError(fault)
-    name = file.stem
-    if arguments.model:
-        name += f"_{Path(arguments.model).stem.removesuffix('.model')}"
-    out = arguments.out or str(file.parent / f"{name}.h5")
-    others = filter(None, (arguments.model, arguments.compare, arguments.start))
+    used = f"_{Path(part).stem.removesuffix('.model')}" if part else ""
+    out = arguments.out or str(file.with_name(f"{file.stem}{used}.h5"))
+    others = filter(None, (part, arguments.compare, arguments.start))
     require_output(out, [arguments.scene, *others], scene)
-    model = load_model(arguments.model) if arguments.model else None
+    model = load_model(part) if part else None
     reference = load(arguments.compare, arguments.unchecked) if arguments.compare else None
     if reference and not (reference.full_order and reference.scene.config == scene.config):
         fault = f"{reference.title} is no run of this scene in full order"

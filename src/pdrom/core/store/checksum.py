@@ -173,7 +173,11 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
     Raises StorageError if the file is missing, cannot be read, is damaged or (if not ``unchecked``)
     has no checksum, or a job of the workflow (`damaged_set_aside`) reads another file than its own.
     """
-    path, condition = Path(path), check_file(path)
+    path = Path(path)
+    readable = path.is_file() and os.access(path, os.R_OK)
+    if sets_aside() and os.path.lexists(path) and not readable:
+        raise _set_aside(path, "damaged, no file that can be read")
+    condition = check_file(path)
     if condition is Condition.INTACT and sets_aside():
         told = read_checksum(path)
         if told and told.file != os.path.normpath(path):

@@ -9,13 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numba import njit
 
 from builders import GRAVITY, LEFT
 from pdrom import api
 from pdrom.api.pictures import viewed_scenes
 from pdrom.api.records import Snapshots
-from pdrom.api.runs import Basis, FrameReport, run_full_order
+from pdrom.api.runs import Basis, FrameReport
 from pdrom.core.errors import ConfigurationError, PdromError
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.runs import trajectory
@@ -48,7 +47,6 @@ def test_the_pages_example_runs_and_is_short(tmp_path, monkeypatch, capsys):
     exec(compile(code, "library.md", "exec"), {})
     said = capsys.readouterr().out
     assert "Model(a model of 'scene' (10 modes" in said
-    assert "against the run of 'scene' by full order, 10 iterations a frame" in said
     assert (tmp_path / "errors.png").stat().st_size > 10_000
 
 
@@ -73,18 +71,6 @@ def test_a_run_is_that_of_the_step_loop(full):
     group = full.scene.group("spring")
     assert full.snapshots["spring"].p.shape == (6, group.elements, 3)
     assert len(training_frames(12, 6)) == 6
-
-
-def test_a_run_logs_how_long_it_compiles_kernels(full, monkeypatch, caplog):
-    caplog.set_level("INFO", "pdrom.api")
-    api.run(full.scene)  # whose kernels are compiled already
-    assert "kernels" not in caplog.text
-    twice = lambda *a, **k: (njit(lambda: 1)(), njit(lambda: 2)(), run_full_order(*a, **k))  # noqa: E731
-    monkeypatch.setattr("pdrom.api.runs.run_full_order", twice)
-    api.run(full.scene)
-    first, last = (text for text in caplog.messages if "kernels" in text)
-    assert first == "scene: compiling kernels (once, up to a minute)"
-    assert re.fullmatch(r"scene: kernels compiled in \d+\.\d s", last)
 
 
 def test_files_are_read_back(full, reduced, tmp_path):
@@ -231,9 +217,3 @@ def test_runs_of_one_scene_are_shown_together(full, reduced):
     assert np.array_equal(alone.positions, reduced.positions)
     other = api.run(api.build_scene(effects=EFFECTS, **KEYS, name="other"))
     assert [one.name for one in viewed_scenes(full, other)] == ["scene", "other"]
-
-
-def test_records_are_compared_and_hashed_by_identity(reduced):
-    assert reduced == reduced
-    assert reduced != replace(reduced)
-    assert len({reduced, reduced.scene}) == 2

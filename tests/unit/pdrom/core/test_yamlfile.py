@@ -13,9 +13,6 @@ from pdrom.core.yamlfile import (
     read_yaml,
     validate,
 )  # fmt: skip
-from pdrom.model.effects import EFFECTS
-from study.artifact import paths
-from study.artifact.paths import Place
 from study.pipeline.commandline import CommandLine
 
 
@@ -138,25 +135,6 @@ INNER = r"\(allowed: size, kind\)"
 def test_faults_name_source_key_and_what_is_allowed(data, message):
     with pytest.raises(ConfigurationError, match=f"^source: {message}"):
         validate(Outer, data, "source")
-
-
-PLACES = [place for place in vars(paths).values() if isinstance(place, Place)]
-# A name on its way to its place, with its checksum: ".", ".0123456789ab" and ".blake2b".
-TEMPORARY = 1 + 13 + 8
-LONGEST = {
-    "scene": 64 * "s", "method": 64 * "m", "group": max(EFFECTS, key=len), "run": "heldout",
-    "mesh": 40 * "m" + "_01234567", "basis": "mass-mean-in-modes-vectorised",
-    "factor": "0.123456789", "name": 64 * "n",
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("place", PLACES, ids=[place.pattern for place in PLACES])
-def test_no_result_has_a_longer_name_than_systems_take(place):
-    labels = {label: LONGEST[label] for label in place.labels}
-    names = place.at("results/studies/" + 60 * "a", **labels).split("/")
-    assert max(map(len, names)) + TEMPORARY <= MAX_NAME
-    # a log has all labels in its name
-    assert len("_".join(labels.values())) + len(".log") <= MAX_NAME
 
 
 def test_bytes_are_counted_not_letters():
