@@ -275,7 +275,7 @@ class Loop:
         ``hold`` is the name of its effect ("pins"), or the selection of its vertices ("left").
         ConfigurationError unless this is one hold of the next frame.
         """
-        moves = {"displacement": [*displacement]}
+        moves = {"displacement": np.asarray(displacement, dtype=object).tolist()}
         shift = np.array(validate(_Asked, moves, "move").displacement)
         active = [b for b in self._loop.space.boundaries if b.active(self.frame)]
         named = isinstance(hold, str)

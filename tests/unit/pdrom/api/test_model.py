@@ -292,7 +292,12 @@ def test_a_loop_computes_the_frames_of_a_run_and_moves_its_holds(full, model):
         assert np.array_equal(loop.positions, expected)
     assert moved.positions[held] == pytest.approx(run[0, held] + [0.0, 0.3, 0.0], abs=1e-12)
     assert np.abs(moved.positions[:, [0, 2]] - loop.positions[:, [0, 2]]).max() > 1e-3
-    for hold, shift in (("right", [0, 0, 0]), ("left", "up")):
+    for hold, shift in (
+        ("right", [0, 0, 0]),
+        ("left", "up"),
+        ("left", 3),
+        ("left", [0, np.nan, 0]),
+    ):
         with pytest.raises(ConfigurationError, match="move: "):
             moved.move(hold, shift)
 

@@ -4,14 +4,11 @@ import os
 from pathlib import Path
 
 import meshio
-import numpy as np
-import pandas as pd
 import pytest
 
 from builders import SMALL
 from pdrom import api
 from pdrom.command.base import Status
-from pdrom.command.cost import shown
 from pdrom.command.main import run
 from pdrom.model.mesh.generators import cloth
 
@@ -36,19 +33,6 @@ def test_settings_are_printed_and_drawn_with_meshes_and_models_of_files(folder, 
     for words in ("2 iterations on 20 vertices", "model own.h5, converged", "\n* ", "12 frames"):
         assert words in said
     assert Path("cost.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_the_table_marks_the_best_and_says_what_is_missing():
-    table = pd.DataFrame({
-        "setting": ["2 iterations", "model own.h5, converged"], "best": [True, False],
-        "position_error": [0.0123, np.inf], "deformation_error": [np.nan, np.inf], "ms": [1.5, 20],
-    })  # fmt: skip
-    table.attrs = {"frames": 60, "busy": True, "mesh_error": 0.034}
-    lines = shown(table, 90).splitlines()
-    assert lines[1].split() == ["*", "2", "iterations", "0.012", "-", "1.5"]
-    assert lines[2].split() == ["model", "own.h5,", "converged", *["blew", "up"] * 2, "20"]
-    assert "over 90 frames; times of the first 60 frames, unreliable" in lines[4]
-    assert "error of the mesh itself: 0.034" in lines[5]
 
 
 @pytest.mark.parametrize(
