@@ -207,7 +207,7 @@ def check_lengths(path: str) -> None:
     """Raise ValueError if ``path`` exceeds `MAX_PATH` bytes or a name in it `MAX_NAME` bytes."""
     for name, most in ((path, MAX_PATH), *((part, MAX_NAME) for part in PurePath(path).parts)):
         if len(os.fsencode(name)) > most:
-            raise ValueError(f"paths of {MAX_PATH} bytes and names of {MAX_NAME} at most")
+            raise ValueError(f"a name of at most {most} bytes is required")
 
 
 def named(keys: Any, stem: str) -> Any:

@@ -140,6 +140,6 @@ def test_faults_name_source_key_and_what_is_allowed(data, message):
 def test_bytes_are_counted_not_letters():
     check_lengths("a/" + 255 * "b")
     check_lengths("a/" * 2000)
-    for path, words in ((128 * "é", f"names of {MAX_NAME}"), (2048 * "a/", str(MAX_PATH))):
+    for path, words in ((128 * "é", f"at most {MAX_NAME} bytes"), (2048 * "a/", str(MAX_PATH))):
         with pytest.raises(ValueError, match=words):
             check_lengths(path)
