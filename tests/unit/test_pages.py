@@ -94,29 +94,25 @@ def test_a_name_that_is_gone_is_found(span: str) -> None:
 
 
 def test_the_scene_the_study_and_the_method_that_are_added_are_valid() -> None:
-    blocks = re.findall(r"```yaml\n(.*?)```", ADDING.read_text("utf-8"), re.DOTALL)
-    scene, study, methods = map(yaml.safe_load, blocks)
+    pages = ADDING.read_text("utf-8") + (CONFIG / "README.md").read_text("utf-8")
+    blocks = re.findall(r"```yaml\n(.*?)```", pages, re.DOTALL)
+    scene, study, methods, keys, bar = map(yaml.safe_load, blocks)
     assert SceneConfig.model_validate(scene).groups == ["spring"]
+    assert SceneConfig.model_validate(bar).groups == ["deformation_gradient", "volume"]
     assert StudySettings.model_validate(study).online.scenes == ()
+    assert StudySettings.model_validate(keys).online.scenes == ("bar80",)
     assert [MethodSpec.model_validate(method).rows for method in methods.values()] == ["scalar"]
 
 
-def test_effects_and_selections_are_listed_with_their_keys_and_what_a_subspace_takes() -> None:
-    page = (CONFIG / "README.md").read_text("utf-8")
-    rows = re.findall(r"^\| `(\w+)` \| (.*) \| (yes|no)[,:]?.* \|$", page, re.MULTILINE)
-    assert sorted(name for name, _, _ in rows) == sorted(EFFECTS)
-    for name, keys, taken in rows:
-        effect = EFFECTS.load(name)
-        assert (taken == "yes") == effect.in_subspace, name
-        assert set(effect.Config.model_fields) - {"effect"} <= set(re.findall(r"`(\w+)`", keys)), (
-            name
-        )
-    kinds = re.findall(r"`\{kind: (\w+), (?:of|\w+)", page.split("### Selections")[1])
-    assert sorted(kinds) == sorted(KINDS)
-    # for who adds a scene, too
-    text = ADDING.read_text("utf-8")
+def test_effects_and_selections_are_listed_and_those_that_no_position_subspace_takes() -> None:
+    page, text = (CONFIG / "README.md").read_text("utf-8"), ADDING.read_text("utf-8")
     (sentence,) = re.findall(r"^Effects: (.*?)\.\n", text, re.MULTILINE | re.DOTALL)
     assert sorted(re.findall(r"`(\w+)`", sentence)) == sorted(EFFECTS)
+    (others,) = re.findall(r"^Position subspaces take all effects but (.*?),", page, re.MULTILINE)
+    refused = {name for name in EFFECTS if not EFFECTS.load(name).in_subspace}
+    assert set(re.findall(r"`(\w+)`", others)) == refused
+    kinds = re.findall(r"`\{kind: (\w+), (?:of|\w+)", page.split("### Selections")[1].split("\n###")[0])
+    assert sorted(kinds) == sorted(KINDS)
 
 
 def test_the_verdicts_of_the_readme_are_the_expected_ones() -> None:
