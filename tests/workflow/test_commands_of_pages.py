@@ -95,8 +95,11 @@ def test_a_run_is_planned(command, checkout):
 @pytest.mark.slow
 def test_the_command_line_works_in_the_order_of_its_page(tmp_path, checkout):
     write_sheet(tmp_path / "sheet.obj")
+    (tmp_path / "config").symlink_to(checkout.folder / "config")
     shown = commands("pdrom ")
     assert len(shown) > 4
+    for words in (("new", "pulled.yaml", "--mesh", "sheet.obj"), ("run", "pulled.yaml")):
+        run(checkout, "pdrom", *words, cwd=tmp_path)  # the scene that the page's reader has written
     for command in shown:
         run(checkout, "pdrom", *shlex.split(command)[1:], cwd=tmp_path)
 
