@@ -17,21 +17,7 @@ from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
 from study.tables.kit import results
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, timed
-from study.tables.kit.results import (
-    CONVERGED,
-    DEFORMATION,
-    ERROR,
-    FAILED,
-    MEASURE,
-    MEASURES,
-    OWN_ERRORS,
-    REFERENCE,
-    against_converged,
-    joined,
-    judged_by,
-    trained,
-    with_held_out,
-)
+from study.tables.kit.results import DEFORMATION, ERROR, EXPERIMENT, FAILED, Rows
 
 FEWER = "fewer-iterations"
 _POINT = [ERROR, "ms_per_frame"]
@@ -46,60 +32,59 @@ _POINT = [ERROR, "ms_per_frame"]
         integer("vertices", "vertices of the mesh that is simulated"),
         *shared("relative_error_within_horizon deformation_error ms_per_frame"),
         timed(flag("pareto", "no point of the scene is as good in error and time, better in one")),
-        REFERENCE,
+        results.REFERENCE,
         *shared("reference_error reference_deformation_error mesh_error"),
         *results.COLUMNS,
         *shared("velocity_error energy_drift"),
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),
-        "timings": Every(paths.TIMINGS),
+        "timings": Rows(paths.TIMINGS),
         "frame_times": TableOf("frame_times"),
-        "sweeps": Every(paths.ITERATIONS),
+        "sweeps": Rows(paths.ITERATIONS),
         "iterations": Setting("scene_iterations"),
     },
 )
 def accuracy_cost(
-    reruns: pd.DataFrame,
-    frame_times: pd.DataFrame,
+    reruns: pd.DataFrame, timings: pd.DataFrame, frame_times: pd.DataFrame, sweeps: pd.DataFrame,
     iterations: Mapping[str, int],
-    **files: list[paths.File],
-) -> pd.DataFrame:
+) -> pd.DataFrame:  # fmt: skip
     """One row for each full-order run, and for each reduced run with a time and an error.
 
     Velocities and energies are compared with the full-order run of the scene's own iterations.
     """
-    times = results.timings_in_one_time(files["timings"], frame_times)
+    times = results.timings_in_one_time(timings, frame_times)
     times = times[times.implementation == "compiled"]
-    sweep = _sweep(joined(files["sweeps"]), times)
+    sweep = _sweep(sweeps, times)
     own = sweep[(sweep.method == FOM) & (sweep.iterations == sweep.scene.map(iterations))]
-    sweep = sweep.assign(mesh_error=None)
-    reduced = against_converged(reruns)
-    points = trained(reduced).dropna(subset=_POINT)
-    vertices = times.groupby("scene").vertices.max()
-    sizes = {"iterations": points.scene.map(iterations), "vertices": points.scene.map(vertices)}
-    points = with_held_out(points.assign(**sizes, mesh_error=None), reduced)
-    known = trained(reruns).drop_duplicates("scene")[["scene", *OWN_ERRORS]]
-    own, sweep = (full.merge(known, "left", "scene") for full in (own.assign(method="full"), sweep))
+    known = results.trained(reruns).drop_duplicates("scene")[["scene", *results.OWN_ERRORS]]
+    full = (own.assign(method="full"), sweep.assign(mesh_error=None))
+    own, sweep = (each.merge(known, "left", "scene") for each in full)
+    reduced = results.against_converged(reruns)
+    points = results.trained(reduced).dropna(subset=_POINT)
+    vertices = points.scene.map(times.groupby("scene").vertices.max())
+    points = points.assign(iterations=points.scene.map(iterations), vertices=vertices)
+    points = results.with_held_out(points.assign(mesh_error=None), reduced)
     parts = [part for part in (own, points, sweep) if len(part)]
-    points = pd.concat(parts or [points], ignore_index=True)
+    points = pd.concat(parts or [points], ignore_index=True).assign(reference=results.CONVERGED)
     for _, rows in points.groupby("scene", sort=False):
         points.loc[rows.index, "pareto"] = pareto(*rows[_POINT].to_numpy(float).T)
-    order = points.scene.map({scene: i for i, scene in enumerate(iterations)})
-    return points.iloc[np.argsort(order, kind="stable")].assign(reference=CONVERGED)
+    order = {scene: place for place, scene in enumerate(iterations)}
+    return points.sort_values("scene", key=lambda scene: scene.map(order), kind="stable")
 
 
 def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     """Rows of full-order runs with each number of iterations, on each mesh of the scene."""
     keys = ["scene", "method", "iterations", "vertices"]
     cost = times.fillna({"method": FOM})[[*keys, "ms_per_frame"]]
-    errors["mesh_error"] = errors.groupby("scene").mesh_error.transform("max")
-    coarser = errors.vertices < errors.groupby("scene").vertices.transform("max")
+    most = errors.groupby("scene")[["mesh_error", "vertices"]].transform("max")
+    coarser = errors.vertices < most.vertices
     names = np.where(coarser, COARSER, FOM), np.where(coarser, COARSER_ANDERSON, ANDERSON)
-    errors["method"] = np.where(errors.window > 0, names[1], names[0])
+    method = np.where(errors.window > 0, names[1], names[0])
+    errors = errors.assign(mesh_error=most.mesh_error, method=method)
     errors = errors.rename(columns={"error_converged": ERROR, "deformation_converged": DEFORMATION})
-    points = errors.merge(cost, on=keys)
-    return points.assign(position_basis="full", k=None, r=None).dropna(subset=_POINT)
+    points = errors.merge(cost, on=keys).dropna(subset=_POINT)
+    return points.assign(position_basis="full", k=None, r=None)
 
 
 # Columns that identify a curve (time of the local step over size r); its rows differ only in r.
@@ -130,7 +115,7 @@ def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
     differ in r. It is empty if the reduction is faster at the largest size (full rank), and the
     smallest size if it is never faster.
     """
-    rows = joined([*own, *(file for file in sized if file["factor"] != OWN_MESH)])
+    rows = results.joined([*own, *(file for file in sized if file["factor"] != OWN_MESH)])
     if rows.empty:
         return rows
     for part, name in (("local", "ratio"), ("solve", "solve_ratio"), ("lift", "lift_ratio")):
@@ -163,8 +148,8 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
 @table(
     title="Where reductions pay and where they lose to the full order",
     columns=(
-        MEASURE,
-        REFERENCE,
+        results.MEASURE,
+        results.REFERENCE,
         *shared("position_basis method"),
         count(
             "scenes", "scenes (and groups) with a timed run, whose reference is known well enough"
@@ -203,39 +188,38 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
     shares = effects.set_index(["scene", "effect"]).force_share
     weak = shares.index[shares <= SHARE]
     found = []
-    for measure in MEASURES:
-        judged = judged_by(against_converged(reruns), measure, FAILED)
-        whole = judged_by(_full_order(points), measure, FAILED)
-        found += [{"measure": measure, **row} for row in _summaries(judged, whole, weak)]
-    return pd.DataFrame(found).assign(reference=CONVERGED)
+    for measure in results.MEASURES:
+        runs = results.against_converged(reruns), _full_order(points)
+        judged = (results.judged_by(rows, measure, FAILED) for rows in runs)
+        found += [{"measure": measure, **row} for row in _summaries(*judged, weak)]
+    return pd.DataFrame(found).assign(reference=results.CONVERGED)
 
 
 def _summaries(
     reruns: pd.DataFrame, whole: pd.DataFrame, weak: pd.MultiIndex
 ) -> Iterator[dict[str, object]]:
     """Yield a row for each method in ``whole`` and ``reruns``, without groups that are ``weak``."""
-    runs = trained(reruns)
-    runs = runs[runs.speedup.notna() & runs.max_extent.notna()]
-    runs = runs[~pd.MultiIndex.from_frame(runs[["scene", "group"]]).isin(weak)]
-    runs = pd.concat([whole, with_held_out(runs, reruns)], ignore_index=True)
+    runs = results.trained(reruns).dropna(subset=["speedup", "max_extent"])
+    runs = runs[~pd.MultiIndex.from_frame(runs[EXPERIMENT]).isin(weak)]
+    runs = pd.concat([whole, results.with_held_out(runs, reruns)], ignore_index=True)
     for (basis, method), own in runs.groupby(["position_basis", "method"], sort=False):
         accurate = own[own[ERROR] <= FAILED]
-        fastest = accurate.sort_values("speedup").groupby(["scene", "group"]).tail(1)
-        speed = fastest.speedup.to_numpy(float)
-        best = own.sort_values(ERROR, kind="stable").groupby(["scene", "group"]).head(1)
+        fastest = accurate.sort_values("speedup").groupby(EXPERIMENT).tail(1)
+        speed, faster = fastest.speedup, fastest.speedup > 1.0
+        best = own.sort_values(ERROR, kind="stable").groupby(EXPERIMENT).head(1)
         seen = best[best.error_heldout.notna()]
         # one run per scene and group, accurate or not: medians of all methods cover the same groups
         every = pd.concat([fastest, best[~(best[ERROR] <= FAILED)]])
         yield {
             "position_basis": basis,
             "method": method,
-            "scenes": own.groupby(["scene", "group"]).ngroups,
+            "scenes": len(best),
             "accurate": len(fastest),
-            "pays": int(np.sum(speed > 1.0)),
-            "loses": int(np.sum(speed <= 1.0)),
-            "best_speedup": fastest.speedup.median(),
-            "least_speedup": fastest.speedup.min(),
-            "most_speedup": fastest.speedup.max(),
+            "pays": int(faster.sum()),
+            "loses": int((~faster).sum()),
+            "best_speedup": speed.median(),
+            "least_speedup": speed.min(),
+            "most_speedup": speed.max(),
             "error_train": every[ERROR].fillna(np.inf).median(),
             "error_heldout": every.error_heldout.median(),
             "heldout": len(seen),
@@ -243,17 +227,15 @@ def _summaries(
             "error_heldout_high": every.error_heldout_high.median(),
             "playback_error": every.playback_error.median(),
             "accurate_heldout": int((seen.error_heldout <= FAILED).sum()),
-            "pays_heldout": int(np.sum((speed > 1.0) & (fastest.error_heldout <= FAILED))),
+            "pays_heldout": int((faster & (fastest.error_heldout <= FAILED)).sum()),
         }
 
 
 def _full_order(points: pd.DataFrame) -> pd.DataFrame:
     """Runs of ``points`` with fewer iterations or coarser meshes, and their speed-ups."""
-    full = points[(points.method == "full") & (points.position_basis == "full")]
-    full = full.set_index("scene")
-    fewer = points[points.method == FOM]
-    fewer = fewer[fewer.iterations < fewer.scene.map(full.iterations)]
+    full = points[(points.method == "full") & (points.position_basis == "full")].set_index("scene")
+    fewer = (points.method == FOM) & (points.iterations < points.scene.map(full.iterations))
     coarser = points[points.method.str.startswith(COARSER)]
-    found = pd.concat([fewer.assign(method=FEWER), coarser.assign(method=COARSER)])
+    found = pd.concat([points[fewer].assign(method=FEWER), coarser.assign(method=COARSER)])
     speedup = found.scene.map(full.ms_per_frame) / found.ms_per_frame
     return found.assign(group="all", speedup=speedup)

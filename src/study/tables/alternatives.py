@@ -12,6 +12,7 @@ from study.artifact.reads import Every, Recorded
 from study.experiments.alternatives import experiment as settings
 from study.tables.kit import results
 from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
+from study.tables.kit.results import Rows
 
 FACTOR = number("factor", "on the vertices along a side of the scene's own mesh", compared="exact")
 STIFFNESS = number("stiffness", "factor on all weights of the scene", compared="exact")
@@ -74,12 +75,12 @@ estimated = partial(replace, *shared("reference_error"))  # column of errors of 
     ),
     reads={
         "parts": Every(paths.ALTERNATIVES),
-        "times": Every(paths.ALTERNATIVE_TIMES),
+        "times": Rows(paths.ALTERNATIVE_TIMES),
         "record": Recorded("alternatives"),
     },
 )
 def alternatives(
-    parts: list[paths.File], times: list[paths.File], record: list[Path]
+    parts: list[paths.File], times: pd.DataFrame, record: list[Path]
 ) -> pd.DataFrame:
     """One row per trajectory and setting (a method with its numbers), in the order of ``parts``.
 
@@ -87,7 +88,7 @@ def alternatives(
     """
     rows = results.joined(parts)
     if len(rows):
-        rows, ms, plain = beside(rows, results.joined(times))
+        rows, ms, plain = beside(rows, times)
         rows = rows.assign(ms_per_frame=ms.median(axis=1), processes=ms.count(axis=1))
         rows["time_ratio"] = (ms / plain).median(axis=1)
         per_ms = rows.time_ratio / rows.ms_per_frame

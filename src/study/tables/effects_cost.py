@@ -1,18 +1,16 @@
 """Tables of times: of effects, local steps and frames, on meshes of several sizes; speed-ups."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pandas as pd
 
 from study.artifact import paths
-from study.artifact.paths import File
-from study.artifact.reads import Every, Setting, TableOf
+from study.artifact.reads import Setting, TableOf
 from study.experiments.frame_times import CONTROL, FULL, REDUCED
 from study.experiments.kit.base import FOM, GLOBAL, REST, RIGHT, Horizon, floor_of, horizons
 from study.experiments.sensitivity import without
 from study.tables.kit import results
 from study.tables.kit.declaration import flag, integer, interval, number, shared, table, text, timed
+from study.tables.kit.results import Rows, with_whole_sizes
 
 KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # value of column effect in a row of a scene from which nothing is left out
@@ -48,41 +46,37 @@ FEWEST = 3  # least number of mesh sizes to which a power law is fitted (table `
         flag("above_floor", "moved is larger than the sensitivity floor", compared="error"),
     ),
     reads={
-        "parts": Every(paths.EFFECTS),
-        "left_out": Every(paths.LEFT_OUT),
-        "contributions": Every(paths.CONTRIBUTIONS),
+        "costs": Rows(paths.EFFECTS),
+        "left_out": Rows(paths.LEFT_OUT),
+        "contributions": Rows(paths.CONTRIBUTIONS),
         "frame_times": TableOf("frame_times"),
         "sensitivity": TableOf("sensitivity"),
         "horizon": Setting("horizon"),
     },
 )
 def effects_cost(
-    frame_times: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon, **files: list[File]
-) -> pd.DataFrame:
+    costs: pd.DataFrame, left_out: pd.DataFrame, contributions: pd.DataFrame,
+    frame_times: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon,
+) -> pd.DataFrame:  # fmt: skip
     """One row per effect or phase of a scene, then one per set of effects left out together.
 
     Phases are right-hand side, global solve and the rest. Column ``moved`` (largest difference of
     runs with and without the effect) is empty for a scene's only constraint group: no run lacks it.
     Times are scaled to those in ``frame_times`` (`in_one_time`).
     """
-    costs, removed = results.joined(files["parts"]), results.joined(files["left_out"])
-    if costs.empty:
-        return costs
     own = costs.groupby("scene").ms_per_frame.sum()
     costs = results.in_one_time(costs, own, frame_times, columns=["ms_per_frame"])
     tables = [costs]
-    if len(removed):
-        whole = removed[removed.left_out == NOTHING].set_index("scene").ms_per_frame
+    if len(left_out):
+        whole = left_out[left_out.left_out == NOTHING].set_index("scene").ms_per_frame
         times = ["ms_per_frame", "own_ms"]
-        removed = results.in_one_time(removed, whole, frame_times, columns=times)
-        removed = removed.rename(columns={"left_out": "effect", "ms_per_frame": "without_ms"})
-        several = removed.rename(columns={"own_ms": "ms_per_frame"})
-        tables.append(several[_absent(several, costs)].assign(role=SEVERAL))
-        single = removed[[*KEYS, "groups", "without_ms"]]
-        tables[0] = costs.merge(single, on=KEYS, how="left")
-    frames = results.joined(files["contributions"])
-    if len(frames):
-        acting = _acting(frames, sensitivity, horizon)
+        removed = results.in_one_time(left_out, whole, frame_times, columns=times)
+        names = {"left_out": "effect", "ms_per_frame": "without_ms", "own_ms": "ms_per_frame"}
+        removed = removed.rename(columns=names)
+        tables.append(removed[_absent(removed, costs)].assign(role=SEVERAL))
+        tables[0] = costs.merge(removed[[*KEYS, "groups", "without_ms"]], on=KEYS, how="left")
+    if len(contributions):
+        acting = _acting(contributions, sensitivity, horizon)
         tables[0] = tables[0].merge(acting, on=KEYS, how="left")
         tables.append(acting[_absent(acting, costs)])
     made = pd.concat(tables, ignore_index=True)
@@ -131,21 +125,19 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
         timed(number("assembly_ms", "time of the right-hand side in a frame", "ms")),
         *shared("global_ms local_share ms_per_frame"),
     ),
-    reads={"timings": Every(paths.TIMINGS), "frame_times": TableOf("frame_times")},
+    reads={"timings": Rows(paths.TIMINGS), "frame_times": TableOf("frame_times")},
 )
-def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
+def local_share(timings: pd.DataFrame, frame_times: pd.DataFrame) -> pd.DataFrame:
     """One row per scene and implementation of the local step, with its share of the frame's time.
 
     The share includes the assembly of the right-hand side, which compiled kernels compute together
     with the projections. Times are scaled to those in ``frame_times`` (`in_one_time`).
     """
     times = results.timings_in_one_time(timings, frame_times)
-    full = times[times.method.isna()].copy()
-    full["local_share"] = (full.local_ms + full.assembly_ms) / full.ms_per_frame
-    order = {name: place for place, name in enumerate(IMPLEMENTATIONS)}
-    scenes = {scene: place for place, scene in enumerate(times.scene.unique())}
-    keys = full.scene.map(scenes) * len(order) + full.implementation.map(order)
-    return full.iloc[keys.argsort(kind="stable")]
+    full = times[times.method.isna()]
+    full = full.assign(local_share=(full.local_ms + full.assembly_ms) / full.ms_per_frame)
+    order = {name: place for place, name in enumerate((*times.scene.unique(), *IMPLEMENTATIONS))}
+    return full.sort_values(["scene", "implementation"], key=lambda names: names.map(order))
 
 
 @table(
@@ -163,10 +155,10 @@ def local_share(timings: list[File], frame_times: pd.DataFrame) -> pd.DataFrame:
         integer("meshes", "sizes of the mesh of the curve"),
         timed(number("exponent", "of the time of an iteration in the number of vertices")),
     ),
-    reads={"parts": Every(paths.SCALING)},
+    reads={"rows": Rows(paths.SCALING)},
 )
-def scaling(parts: list[File]) -> pd.DataFrame:
-    """One row per scene, mesh size and method, from the files ``parts`` of all scenes.
+def scaling(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row per scene, mesh size and method.
 
     Compiled code runs the local step and the solve of ecsw as one, whose time counts as local, so
     that local_share is the share of all iterations there.
@@ -174,15 +166,12 @@ def scaling(parts: list[File]) -> pd.DataFrame:
     The exponent is fitted in logarithms to all meshes of a scene and method. It is empty for fewer
     than three meshes: any two points fit a power law.
     """
-    rows = results.joined(parts)
-    if rows.empty:
-        return rows
     own = rows[rows.method == FOM].set_index(["scene", "vertices"])
     mesh = pd.MultiIndex.from_frame(rows[["scene", "vertices"]])
-    rows["speedup"] = own.ms_per_iteration.loc[mesh].to_numpy() / rows.ms_per_iteration
+    speedup = own.ms_per_iteration.loc[mesh].to_numpy() / rows.ms_per_iteration
     curves = rows.groupby(["scene", "method"], sort=False)
-    rows["meshes"] = curves.vertices.transform("nunique")
-    rows["exponent"] = np.nan
+    meshes = curves.vertices.transform("nunique")
+    rows = rows.assign(speedup=speedup, meshes=meshes, exponent=np.nan)
     for _, curve in curves:
         if curve.vertices.nunique() >= FEWEST:
             x, y = np.log(curve[["vertices", "ms_per_iteration"]].to_numpy(float)).T
@@ -192,7 +181,6 @@ def scaling(parts: list[File]) -> pd.DataFrame:
 
 _MODEL = ["scene", "position_basis", "k", "method"]
 _REDUCTION = ["scene", "group", "method", "r"]
-_LABELS = ["scene", "group", "method", "position_basis", "k", "r"]
 # As a control, the full-order run is timed twice. Speed-ups are not shown if the two times differ
 # by more than this factor, which was fixed on 2026-11-22, before any control was measured.
 CONFIRMED = 1.5
@@ -220,34 +208,27 @@ _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high
         timed(number("twin_ratio", "time of the scene's twin, the same frames, over this one")),
         *map(timed, interval("twin_low twin_high")),
     ),
-    reads={"parts": Every(paths.FRAME_TIMES)},
+    reads={"rows": Rows(paths.FRAME_TIMES)},
 )
-def frame_times(parts: list[File]) -> pd.DataFrame:
+def frame_times(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per scene: medians over processes of full-order frame times and of their ratios."""
-    rows = results.joined(parts)
-    if rows.empty:
-        return rows
     full, control = (
         rows[rows.role == role].pivot(index="process", columns="scene", values="ms_per_frame")
         for role in (FULL, CONTROL)
     )
-    vertices = rows.groupby("scene").vertices.first()
     made = []
-    for scene in rows.scene.unique():
+    for scene, own in rows.groupby("scene", sort=False):
         values = {
-            ("ms_per_frame", "low_ms", "high_ms"): full[scene],
-            ("control_ratio", "control_low", "control_high"): control[scene] / full[scene],
+            "ms_per_frame low_ms high_ms": full[scene],
+            "control_ratio control_low control_high": control[scene] / full[scene],
         }
-        if f"{scene}{results.TWIN}" in full:
-            twin = full[f"{scene}{results.TWIN}"] / full[scene]
-            values["twin_ratio", "twin_low", "twin_high"] = twin
-        row = {"scene": scene, "vertices": vertices[scene], "processes": len(full)}
-        row["processor_share"] = float(rows.processor_share[rows.scene == scene].median())
-        for names, measured in values.items():
-            row |= zip(names, results.median_interval(measured.to_numpy(float)), strict=True)
-        low, high = row["control_low"], row["control_high"]
-        row["control_agrees"] = low <= 1.0 <= high
-        made.append(row)
+        if (twin := f"{scene}{results.TWIN}") in full:
+            values["twin_ratio twin_low twin_high"] = full[twin] / full[scene]
+        row = {"scene": scene, "vertices": own.vertices.iloc[0], "processes": len(full)}
+        for names, ratios in values.items():
+            row |= zip(names.split(), results.median_interval(ratios.to_numpy(float)), strict=True)
+        row["control_agrees"] = row["control_low"] <= 1.0 <= row["control_high"]
+        made.append(row | {"processor_share": own.processor_share.median()})
     return pd.DataFrame(made).reindex(columns=frame_times.column_names)
 
 
@@ -269,66 +250,68 @@ def frame_times(parts: list[File]) -> pd.DataFrame:
         *results.COLUMNS,
     ),
     reads={
-        "parts": Every(paths.FRAME_TIMES),
+        "measured": Rows(paths.FRAME_TIMES),
         "times": TableOf("frame_times"),
-        "projections": Every(paths.PROJECTION_SECONDS),
-        "subspaces": Every(paths.SUBSPACES_SECONDS),
-        "large": Every(paths.ONLINE),
+        "projections": Rows(paths.PROJECTION_SECONDS),
+        "subspaces": Rows(paths.SUBSPACES_SECONDS),
+        "large": Rows(paths.ONLINE),
         "reruns": TableOf("reduced_reruns"),
     },
 )
-def speedups(times: pd.DataFrame, reruns: pd.DataFrame, **files: list[File]) -> pd.DataFrame:
+def speedups(
+    measured: pd.DataFrame, times: pd.DataFrame, projections: pd.DataFrame,
+    subspaces: pd.DataFrame, large: pd.DataFrame, reruns: pd.DataFrame,
+) -> pd.DataFrame:  # fmt: skip
     """One row per timed reduction; speed-ups compare runs of one and the same process."""
-    rows = results.joined(files["parts"])
-    if rows.empty or not (rows.role == REDUCED).any():
-        return pd.DataFrame()
-    made = pd.DataFrame(list(timed_reductions(rows, times)))
-    extra = [
-        results.joined(files["projections"]).reindex(columns=[*_REDUCTION, "reduction_s"]),
-        results.joined(files["subspaces"]).reindex(columns=[*_MODEL, "reduction_s"]),
+    made = timed_reductions(measured, times)
+    if made.empty:
+        return made
+    inside, small = made.position_basis != "full", results.against_converged(reruns)
+    seconds, errors = [subspaces], [_errors(small, _MODEL)]
+    if len(large):
+        seconds.append(results.trained(large))
+        errors.append(large_errors(large))
+    parts = [
+        _with_costs(made[~inside], _REDUCTION, [projections], [_errors(small, _REDUCTION)]),
+        _with_costs(made[inside], _MODEL, seconds, errors),
     ]
-    small = results.against_converged(reruns)
-    errors = [_errors(small, keys) for keys in (_REDUCTION, _MODEL)]
-    own = results.joined(files["large"])
-    if len(own):
-        extra.append(own[own.motion == results.TRAIN].reindex(columns=[*_MODEL, "reduction_s"]))
-        errors.append(large_errors(own))
-    made = _first_known(made, extra, "reduction_s")
-    for column in (*_TRAIN.values(), *(column.name for column in results.COLUMNS)):
-        made = _first_known(made, errors, column)
-    large = ~made.scene.isin(reruns.scene)
-    made["reference"] = large.map({True: results.ITERATIONS, False: results.CONVERGED})
+    made = pd.concat([part for part in parts if len(part)]).sort_index()
+    of_large = ~made.scene.isin(reruns.scene)
+    made["reference"] = of_large.map({True: results.ITERATIONS, False: results.CONVERGED})
     made["training_s"] = 1e-3 * made.full_ms * made.frames
     saved = made.full_ms - made.ms_per_frame
     paid = 1e3 * (made.training_s + made.reduction_s) / saved
     return made.assign(frames_to_break_even=paid.where(saved > 0.0))
 
 
-def timed_reductions(rows: pd.DataFrame, times: pd.DataFrame) -> Iterator[dict]:
-    """Yield a row for each reduction in ``rows``, which have its time in each process."""
-    full = rows[rows.role == FULL].set_index(["scene", "process"]).ms_per_frame
+def _with_costs(
+    made: pd.DataFrame, keys: list[str], seconds: list[pd.DataFrame], errors: list[pd.DataFrame]
+) -> pd.DataFrame:
+    """Return ``made`` with ``reduction_s`` and errors of the rows with the same ``keys``."""
+    found = made.reset_index()
+    for source in (pd.concat(seconds).reindex(columns=[*keys, "reduction_s"]), pd.concat(errors)):
+        found = with_whole_sizes(found).merge(with_whole_sizes(source), on=keys, how="left")
+    return found.set_index("index")
+
+
+def timed_reductions(measured: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
+    """One row for each reduction in ``measured``, whose rows have its time in each process."""
+    rows = measured.set_index(["scene", "process"])
+    full, reduced = rows[rows.role == FULL].ms_per_frame, rows[rows.role == REDUCED]
     trusted = confirmed(times.set_index("scene"))
-    reduced = rows[rows.role == REDUCED]
-    for labels, own in reduced.groupby(_LABELS, sort=False, dropna=False):
-        own = own.set_index(["scene", "process"])
-        vertices_ms, own = float(own.vertices_ms.median()), own.ms_per_frame
-        ratio, low, high = results.median_interval((full.loc[own.index] / own).to_numpy(float))
-        scene = labels[0]
-        first = rows[rows.scene == scene].iloc[0]
-        yield {
-            **dict(zip(_LABELS, labels, strict=True)),
-            "vertices": first.vertices,
-            "frames": first.frames,
-            "processes": len(own),
-            "full_ms": float(full.loc[own.index].median()),
-            "ms_per_frame": float(own.median()),
-            "vertices_ms": vertices_ms,
-            "speedup": ratio,
-            "speedup_low": low,
-            "speedup_high": high,
-            "shown": results.in_words(ratio, low, high) if trusted[scene] else UNCONFIRMED,
-            "loses": high < 1.0,
-        }
+    made = []
+    for labels, own in reduced.groupby(results.KEYS, sort=False, dropna=False):
+        before = full.loc[own.index]
+        ratio, low, high = results.median_interval((before / own.ms_per_frame).to_numpy(float))
+        shown = results.in_words(ratio, low, high) if trusted[labels[0]] else UNCONFIRMED
+        made.append({
+            **dict(zip(results.KEYS, labels, strict=True)),
+            "vertices": own.vertices.iloc[0], "frames": own.frames.iloc[0], "processes": len(own),
+            "full_ms": before.median(), "ms_per_frame": own.ms_per_frame.median(),
+            "vertices_ms": own.vertices_ms.median(), "speedup": ratio, "speedup_low": low,
+            "speedup_high": high, "shown": shown, "loses": high < 1.0,
+        })  # fmt: skip
+    return pd.DataFrame(made)
 
 
 def confirmed(times: pd.DataFrame) -> pd.Series:
@@ -349,26 +332,13 @@ def unreliable(times: pd.DataFrame) -> bool:
 def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     runs = reruns[(reruns.position_basis != "full") == (keys == _MODEL)]
     train = results.trained(runs)[[*keys, *_TRAIN]].rename(columns=_TRAIN)
-    sizes = {key: "Int64" for key in keys if key in ("k", "r")}
-    return train.astype(sizes).merge(results.over_motions(runs, keys), on=keys, how="outer")
+    return with_whole_sizes(train).merge(results.over_motions(runs, keys), on=keys, how="outer")
 
 
 def large_errors(large: pd.DataFrame) -> pd.DataFrame:
     """Errors over all frames, per model: on the training motion; median, range on held-out ones."""
     whole = large.rename(columns={"relative_error": results.ERROR}).assign(horizon_frame=1)
     return _errors(whole, _MODEL)
-
-
-def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -> pd.DataFrame:
-    """Add ``column`` to ``made``: each row's value in the first of ``sources`` that has one."""
-    found = pd.Series(float("nan"), made.index)
-    for source in sources:
-        keys = [key for key in _LABELS if key in source.columns]
-        sizes = {key: "Int64" for key in keys if key in ("k", "r")}
-        known = source.dropna(subset=[*keys, column])[[*keys, column]].astype(sizes)
-        own = made[keys].astype(sizes).merge(known, on=keys, how="left")[column]
-        found = found.fillna(own.astype(float).set_axis(made.index))
-    return made.assign(**{column: found})
 
 
 @table(
@@ -390,20 +360,17 @@ def _first_known(made: pd.DataFrame, sources: list[pd.DataFrame], column: str) -
         *shared("speedup speedup_low speedup_high"),
     ),
     reads={
-        "parts": Every(paths.ONLINE),
-        "measured": Every(paths.FRAME_TIMES),
+        "rows": Rows(paths.ONLINE),
+        "measured": Rows(paths.FRAME_TIMES),
         "times": TableOf("frame_times"),
     },
 )
-def online(parts: list[File], measured: list[File], times: pd.DataFrame) -> pd.DataFrame:
-    """One row per model of a large scene: errors in ``parts``, times in ``measured``, ``times``."""
-    rows = results.joined(parts)
-    if rows.empty:
-        return rows
-    found = pd.DataFrame(list(timed_reductions(results.joined(measured), times)))
-    made = rows[rows.motion == results.TRAIN].rename(columns={"r": "elements_sampled"})
+def online(rows: pd.DataFrame, measured: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
+    """One row per model of a large scene: errors in ``rows``, times in ``measured``, ``times``."""
+    made = results.trained(rows).rename(columns={"r": "elements_sampled"})
     made = made.assign(reference=results.ITERATIONS)
     made = made.drop(columns="playback_error")  # zero, as playback repeats the training motion
-    made = made.merge(large_errors(rows).rename(columns=_ERRORS), on=_MODEL, how="left")
-    made = made.merge(found[[*_MODEL, *_TIMES]], on=_MODEL, how="left")
+    found = timed_reductions(measured, times)[[*_MODEL, *_TIMES]]
+    for source in (large_errors(rows).rename(columns=_ERRORS), found):
+        made = with_whole_sizes(made).merge(with_whole_sizes(source), on=_MODEL, how="left")
     return made.assign(ms_per_iteration=made.ms_per_frame / made.iterations)

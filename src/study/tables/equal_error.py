@@ -14,26 +14,13 @@ import pandas as pd
 from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.reduction.settings import pareto
 from study.artifact import paths
-from study.artifact.reads import Every, Recorded, Setting, TableOf
-from study.experiments.alternatives.experiment import (
-    CONVERGED,
-    REDUCTIONS,
-    SETTING,
-    ReducedModel,
-)
+from study.artifact.reads import Recorded, Setting, TableOf
+from study.experiments.alternatives.experiment import CONVERGED, REDUCTIONS, SETTING, ReducedModel
 from study.tables import alternatives as runs
 from study.tables.kit import results
-from study.tables.kit.declaration import (
-    Column,
-    flag,
-    integer,
-    interval,
-    number,
-    shared,
-    table,
-    text,
-    timed,
-)
+from study.tables.kit.declaration import Column, flag, integer, interval, number, shared, table
+from study.tables.kit.declaration import text, timed
+from study.tables.kit.results import Rows
 
 # The reduced model of `equal_error`; where a recording holds fewer modes, the nearest number.
 FIXED = ReducedModel(training_motions=(1, 2))
@@ -90,13 +77,13 @@ def opponent(prefix: str, where: str) -> list[Column]:
     ),
     reads={
         "rows": TableOf("alternatives"),
-        "times": Every(paths.ALTERNATIVE_TIMES),
+        "times": Rows(paths.ALTERNATIVE_TIMES),
         "elements": Setting("compared_elements"),
         "record": Recorded("equal_error"),
     },
 )
 def equal_error(
-    rows: pd.DataFrame, times: list[paths.File], elements: Mapping[str, str], record: list[Path]
+    rows: pd.DataFrame, times: pd.DataFrame, elements: Mapping[str, str], record: list[Path]
 ) -> pd.DataFrame:
     """One row per test trajectory and reduced model with the settings of `FIXED`.
 
@@ -125,7 +112,7 @@ def equal_error(
 
 
 def _of_this_run(
-    rows: pd.DataFrame, times: list[paths.File]
+    rows: pd.DataFrame, times: pd.DataFrame
 ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     """`alternatives.beside` for rows of this run; errors of runs that blew up are infinite."""
     rows = rows[rows.recorded.isna()]
@@ -133,7 +120,7 @@ def _of_this_run(
         return rows, pd.DataFrame(), pd.DataFrame()
     blown = ~rows.finite.astype(bool)
     rows = rows.assign(error=rows.error_implicit.mask(blown, np.inf))
-    return runs.beside(rows, results.joined(times))
+    return runs.beside(rows, times)
 
 
 def _fixed(rows: pd.DataFrame) -> Iterator[Any]:
@@ -198,11 +185,11 @@ def _beside(full: pd.DataFrame, model: Any, ms: pd.DataFrame, prefix: str) -> di
     ),
     reads={
         "rows": TableOf("alternatives"),
-        "times": Every(paths.ALTERNATIVE_TIMES),
+        "times": Rows(paths.ALTERNATIVE_TIMES),
         "record": Recorded("frontier"),
     },
 )
-def frontier(rows: pd.DataFrame, times: list[paths.File], record: list[Path]) -> pd.DataFrame:
+def frontier(rows: pd.DataFrame, times: pd.DataFrame, record: list[Path]) -> pd.DataFrame:
     """One row per setting that no other of its part beats in validation error and time.
 
     Scenes without validation trajectories, or with other weights than their own, have no rows. A

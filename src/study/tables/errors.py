@@ -18,9 +18,10 @@ import pandas as pd
 
 from pdrom.reduction.basis import load_basis
 from study.artifact import paths
-from study.artifact.reads import EachOf, Every, TableOf
+from study.artifact.reads import EachOf, TableOf
 from study.tables.kit import declaration, results
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, text
+from study.tables.kit.results import Rows
 
 _SMALL = "empty at round-off level"
 # Errors of approximations amplify rounding errors less than runs do, 7e-4 at most was measured.
@@ -45,11 +46,10 @@ def singular_values(bases: list[paths.File]) -> pd.DataFrame:
     parts = []
     for file in bases:
         basis = load_basis(file.path)
-        sigma = basis.singular_values
-        modes = pd.DataFrame({"component": range(1, len(sigma) + 1), "singular_value": sigma})
-        modes["relative"] = sigma / sigma[0] if sigma[0] > 0.0 else float("nan")
-        modes["above_roundoff"] = modes.component <= basis.rank
-        parts.append(modes.assign(scene=file["scene"], group=file["group"]))
+        sigma, component = basis.singular_values, np.arange(1, len(basis.singular_values) + 1)
+        modes = pd.DataFrame({"component": component, "singular_value": sigma, **file.labels})
+        relative = sigma / sigma[0] if sigma[0] > 0.0 else np.nan
+        parts.append(modes.assign(relative=relative, above_roundoff=component <= basis.rank))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -64,11 +64,11 @@ def singular_values(bases: list[paths.File]) -> pd.DataFrame:
         integer("rows_sampled", "rows of the projections that are evaluated", compared="value"),
         *shared("elements_sampled"),
     ),
-    reads={"parts": Every(paths.RECONSTRUCTION)},
+    reads={"rows": Rows(paths.RECONSTRUCTION)},
 )
-def reconstruction_error(parts: list[paths.File]) -> pd.DataFrame:
-    """Rows of all files ``parts``, one file per scene, group and method, in order."""
-    return results.joined(parts)
+def reconstruction_error(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the ``rows`` of all scenes, groups and methods."""
+    return rows
 
 
 @table(
@@ -79,13 +79,12 @@ def reconstruction_error(parts: list[paths.File]) -> pd.DataFrame:
         integer("frame", "number of the frame, from 0"),
         number("relative_difference", "largest over the seeds", compared="error"),
     ),
-    reads={"parts": Every(paths.SENSITIVITY)},
+    reads={"rows": Rows(paths.SENSITIVITY)},
 )
-def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
+def sensitivity(rows: pd.DataFrame) -> pd.DataFrame:
     """Relative difference of perturbed and unperturbed runs: largest over seeds, for each frame."""
-    keys = ["scene", "perturbation", "frame"]
-    rows = results.joined(parts).groupby(keys, sort=False, as_index=False)
-    return rows["relative_difference"].max()
+    frames = rows.groupby(["scene", "perturbation", "frame"], sort=False, as_index=False)
+    return frames.relative_difference.max()
 
 
 @table(
@@ -106,11 +105,11 @@ def sensitivity(parts: list[paths.File]) -> pd.DataFrame:
         results.REFERENCE,
         number("relative_error", "error of the positions over all frames up to the horizon"),
     ),
-    reads={"parts": Every(paths.NOISE)},
+    reads={"rows": Rows(paths.NOISE)},
 )
-def noise(parts: list[paths.File]) -> pd.DataFrame:
-    """Rows of files ``parts``, one per scene and group: runs with bases made of round-off."""
-    return results.joined(parts).assign(reference=results.ITERATIONS)
+def noise(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the ``rows`` of all scenes and groups: runs with bases made of round-off."""
+    return rows.assign(reference=results.ITERATIONS)
 
 
 @table(
@@ -127,24 +126,20 @@ def noise(parts: list[paths.File]) -> pd.DataFrame:
         *declaration.extremes("gain"),
         number("spread", "largest error over least", compared="error"),
     ),
-    reads={"parts": Every(paths.REPETITIONS)},
+    reads={"rows": Rows(paths.REPETITIONS)},
 )
-def repetitions(parts: list[paths.File]) -> pd.DataFrame:
+def repetitions(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per scene, group, method, r and ``varied``, the choice in which repeated runs differ.
 
     The median of any distribution lies outside the range of n independent draws with probability
     2^(1 - n): five draws enclose it with probability 15/16.
     """
-    rows = results.joined(parts)
-    if rows.empty:
-        return rows
-    cells = rows.groupby(_CELL, sort=False)
+    cells = rows.assign(infinite=np.isinf(rows.error)).groupby(_CELL, sort=False)
     ends = {"median": "median", "low": "min", "high": "max"}
     found = {f"{n}_{end}": (n, how) for n in ("error", "gain") for end, how in ends.items()}
-    made = cells.agg(repetitions=("error", "size"), **found)
-    made["ended"] = rows.error.isin([float("inf")]).groupby([rows[c] for c in _CELL]).sum()
-    made = made.assign(spread=made.error_high / made.error_low, reference=results.ITERATIONS)
-    return made.reset_index()
+    made = cells.agg(repetitions=("error", "size"), ended=("infinite", "sum"), **found)
+    spread = made.error_high / made.error_low
+    return made.assign(spread=spread, reference=results.ITERATIONS).reset_index()
 
 
 @table(
@@ -172,11 +167,11 @@ def repetitions(parts: list[paths.File]) -> pd.DataFrame:
         *declaration.extremes("error"),
         *declaration.extremes("gain"),
     ),
-    reads={"parts": Every(paths.LADDER)},
+    reads={"rows": Rows(paths.LADDER)},
 )
-def ladder(parts: list[paths.File]) -> pd.DataFrame:
-    """Join the tables in the files ``parts``, one for each scene and group, in their order."""
-    return results.joined(parts).assign(reference=results.ITERATIONS)
+def ladder(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the ``rows`` of all scenes and groups."""
+    return rows.assign(reference=results.ITERATIONS)
 
 
 # Step that changes samples, in table gain_interventions -> (method before it, method after it).
@@ -187,17 +182,14 @@ STEPS = {
 # Change -> methods of table ladder before and after it: one set of coefficients for x, y and z,
 # three elements a mode for one, or whole elements sampled instead of single rows (compared only if
 # elements have several rows).
+_SAMPLES = "single rows", "whole elements", "three elements"
 SQUARE = {
-    "shared coefficients, single rows": ("single rows, separate", "single rows, shared"),
-    "shared coefficients, whole elements": ("whole elements, separate", "whole elements, shared"),
-    "shared coefficients, three elements": ("three elements, separate", "three elements, shared"),
-    "three elements, separate coefficients": (
-        "whole elements, separate",
-        "three elements, separate",
-    ),
-    "three elements, shared coefficients": ("whole elements, shared", "three elements, shared"),
-    "whole elements, separate coefficients": ("single rows, separate", "whole elements, separate"),
-    "whole elements, shared coefficients": ("single rows, shared", "whole elements, shared"),
+    **{f"shared coefficients, {own}": (f"{own}, separate", f"{own}, shared") for own in _SAMPLES},
+    **{
+        f"{after}, {kind} coefficients": (f"{before}, {kind}", f"{after}, {kind}")
+        for before, after in (_SAMPLES[1:], _SAMPLES[:2])
+        for kind in ("separate", "shared")
+    },
 }
 # Step -> methods; of any two, that with the larger error amplification (gain) is "before" the step.
 KINDS = {
@@ -253,12 +245,12 @@ def gain_interventions(
     runs = results.judged_runs(reruns, reconstruction)
     rows = []
     square = _square(ladder, runs) if len(ladder) else runs[:0].assign(rows_per_element=1)
-    for name, before, after, pairs in _steps(runs, square):
+    for *names, pairs in _steps(runs, square):
         volumes = pairs.group.isin(VOLUMES)
         for mesh, own in zip(MESHES, (pairs, pairs[~volumes], pairs[volumes]), strict=True):
             if len(own):
-                labels = {"step": name, "mesh": mesh, "method_before": before}
-                rows.append({**labels, "method_after": after, **_summary(own)})
+                labels = zip(("step", "method_before", "method_after"), names, strict=True)
+                rows.append({**dict(labels), "mesh": mesh, **_summary(own)})
     return pd.DataFrame(rows).assign(reference=results.ITERATIONS)
 
 
@@ -274,19 +266,16 @@ def _steps(
         yield name, before, after, _pairs(chosen, before, after)
     for name, kind in KINDS.items():
         pairs = pd.concat([_pairs(runs, *two) for two in combinations(kind, 2)])
-        rising = pairs.gain > 1.0
-        falling = pairs.assign(
-            gain=pairs.gain.where(~rising, 1.0 / pairs.gain),
-            error=pairs.error.where(~rising, 1.0 / pairs.error),
-        )
-        yield name, "the larger gain", "the smaller gain", falling[falling.gain < 1.0]
+        ratios = pairs[["gain", "error"]]
+        pairs[["gain", "error"]] = ratios.where(pairs.gain <= 1.0, 1.0 / ratios, axis=0)
+        yield name, "the larger gain", "the smaller gain", pairs[pairs.gain < 1.0]
 
 
 def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
     """Rows of ``ladder`` with direction "square" and with a scene, group and r of ``runs``."""
     chosen = ladder[(ladder.direction == "square") & ladder.gain.notna()]
     chosen = chosen.rename(columns={"rung": "method"})
-    error = chosen.relative_error_within_horizon.astype(float).fillna(np.inf)
+    error = chosen[results.ERROR].astype(float).fillna(np.inf)
     places = runs[[*_PLACE, "sensitivity_floor"]].drop_duplicates(_PLACE)
     return chosen.assign(error=error).merge(places, on=_PLACE)
 
@@ -315,13 +304,13 @@ def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
     drawn = np.random.default_rng(results.SEED).integers(len(values), size=size)
     medians = [np.median(np.concatenate([values[i] for i in row])) for row in drawn]
     low, high = np.percentile(medians, [2.5, 97.5], method="inverted_cdf")
-    failing = pairs.error_before > results.FAILED
+    failing, after = pairs.error_before > results.FAILED, pairs.error_after > results.FAILED
     return {
         "pairs": len(pairs),
         "scenes": pairs.scene.nunique(),
         "failing": int(failing.sum()),
-        "rescued": int((failing & (pairs.error_after <= results.FAILED)).sum()),
-        "failing_after": int((pairs.error_after > results.FAILED).sum()),
+        "rescued": int((failing & ~after).sum()),
+        "failing_after": int(after.sum()),
         "error_before": float(pairs.error_before.median()),
         "error_after": float(pairs.error_after.median()),
         "gain_ratio": float(pairs.gain.median()),

@@ -17,7 +17,9 @@ from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import TRAIN, Horizon, floor_of, horizons
 from study.tables.kit import results
 from study.tables.kit.declaration import flag, number, shared, table, text
+from study.tables.kit.results import Rows
 
+_NAMES = ["scene", "group", "method", "position_basis"]
 
 @table(
     title="Reduced runs of the training and the held-out motions",
@@ -38,22 +40,23 @@ from study.tables.kit.declaration import flag, number, shared, table, text
         ),
     ),
     reads={
-        "references": Every(paths.REFERENCES),
+        "references": Rows(paths.REFERENCES),
         "runs": Every(paths.RERUNS),
         "rows": Every(paths.RERUNS_TRAIN),
         "rows_heldout": Every(paths.RERUNS_HELDOUT),
         "subspaces": Every(paths.SUBSPACES),
         "subspace_rows": Every(paths.SUBSPACES_TRAIN),
         "subspace_rows_heldout": Every(paths.SUBSPACES_HELDOUT),
-        "timings": Every(paths.TIMINGS),
+        "timings": Rows(paths.TIMINGS),
         "frame_times": TableOf("frame_times"),
         "sensitivity": TableOf("sensitivity"),
         "horizon": Setting("horizon"),
     },
 )
 def reduced_reruns(
-    frame_times: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon, **files: list[File]
-) -> pd.DataFrame:
+    references: pd.DataFrame, timings: pd.DataFrame, frame_times: pd.DataFrame,
+    sensitivity: pd.DataFrame, horizon: Horizon, **files: list[File],
+) -> pd.DataFrame:  # fmt: skip
     """Reduced runs of the training motion with their times, then runs of each held-out motion.
 
     There is one row per motion, scene, group, method and r. Rows of runs in position subspaces
@@ -64,7 +67,6 @@ def reduced_reruns(
     Errors are against the full-order run with the scene's iterations, and also against the
     converged one.
     """
-    references = results.joined(files["references"])
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
         label = horizon.perturbation if motion == TRAIN else motion
@@ -74,21 +76,21 @@ def reduced_reruns(
         both = zip(files["runs"] + files["subspaces"], tables, strict=True)
         parts = [_judged(run, row, ends[run["scene"]], motion) for run, row in both]
         found = pd.concat(parts, ignore_index=True).assign(motion=motion)
-        floors = {s: floor_of(sensitivity, s, label)[:end] for s, end in ends.items()}
-        floor = {scene: float(drift.max(initial=0.0)) for scene, drift in floors.items()}
+        floor = {
+            scene: float(floor_of(sensitivity, scene, label)[:end].max(initial=0.0))
+            for scene, end in ends.items()
+        }
         found["horizon_frame"] = found.scene.map(ends)
         found["sensitivity_floor"] = found.scene.map(floor)
         if motion != TRAIN:
             played = _played(references, motion)
-            distance = played.set_index("scene").playback_error
-            found["playback_error"] = found.scene.map(distance)
+            found["playback_error"] = found.scene.map(played.set_index("scene").playback_error)
             found = pd.concat([found, played], ignore_index=True)
         judged.append(found)
-    judged[0] = _with_times(judged[0], results.timings_in_one_time(files["timings"], frame_times))
+    judged[0] = _with_times(judged[0], results.timings_in_one_time(timings, frame_times))
     made = pd.concat(judged, ignore_index=True).assign(reference=results.ITERATIONS)
-    return made.merge(
-        references[["scene", "motion", *results.OWN_ERRORS]], on=["scene", "motion"], how="left"
-    )
+    known = references[["scene", "motion", *results.OWN_ERRORS]]
+    return made.merge(known, on=["scene", "motion"], how="left")
 
 
 def _played(references: pd.DataFrame, motion: str) -> pd.DataFrame:
@@ -147,16 +149,12 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     reduced["position_basis"] = reduced.position_basis.fillna("full")
     reduced["local_ms"] += reduced.assembly_ms + reduced.lift_ms
     reduced["speedup"] = reduced.scene.map(reference) / reduced.ms_per_frame
-    measured = ["ms_per_frame", "vertices_ms", "local_ms", "global_ms", "speedup"]
-    parts = []
     # match rows of subspace models by the size k, as their r is the number of sampled elements
-    for inside, left_out in ((False, "k"), (True, "r")):
-        keys, whole = [k for k in results.KEYS if k != left_out], {"k": "int64"} if inside else {}
-        rows, found = (each[(each.position_basis != "full") == inside] for each in (runs, reduced))
-        if len(rows):
-            found = found[keys + measured].astype(whole)
-            parts.append(rows.astype(whole).merge(found, on=keys, how="left"))
-    return pd.concat(parts, ignore_index=True)
+    for rows in (runs, reduced):
+        rows["size"] = rows.r.where(rows.position_basis == "full", rows.k).astype(float)
+    keys = [*_NAMES, "size"]
+    measured = ["ms_per_frame", "vertices_ms", "local_ms", "global_ms", "speedup"]
+    return runs.merge(reduced[keys + measured], on=keys, how="left")
 
 
 # Possible outcomes of a run.
@@ -180,9 +178,9 @@ FRAGILE = 0.005
     ),
     reads={
         "full_order": Every(paths.TRAIN),
-        "reruns": Every(paths.RERUNS_TRAIN),
-        "subspaces": Every(paths.SUBSPACES_TRAIN),
-        "sweeps": Every(paths.STABILITY),
+        "reruns": Rows(paths.RERUNS_TRAIN),
+        "subspaces": Rows(paths.SUBSPACES_TRAIN),
+        "sweeps": Rows(paths.STABILITY),
         "reduced_reruns": TableOf("reduced_reruns"),
         "time_steps": Setting("scene_time_steps"),
         "wrong": Setting("stability.wrong"),
@@ -190,22 +188,22 @@ FRAGILE = 0.005
     },
 )
 def stability(
-    reduced_reruns: pd.DataFrame,
-    time_steps: Mapping[str, float],
-    wrong: float,
-    departure: float,
-    **files: list[File],
-) -> pd.DataFrame:
+    full_order: list[File], reruns: pd.DataFrame, subspaces: pd.DataFrame, sweeps: pd.DataFrame,
+    reduced_reruns: pd.DataFrame, time_steps: Mapping[str, float], wrong: float, departure: float,
+) -> pd.DataFrame:  # fmt: skip
     """Outcomes of reduced runs ("rerun"), then of short runs with other h or stiffness ("sweep").
 
     Method "full" with position basis "full" is the full-order run. The error of a "rerun" row is
     taken over the frames in which perturbed runs still agree, that of a "sweep" row over all.
     """
-    reruns = _rerun_rows(files["reruns"], files["subspaces"], reduced_reruns)
-    runs = pd.concat([_full_order_rows(files["full_order"]), reruns], ignore_index=True)
+    runs = pd.concat([reruns.assign(position_basis="full", k=np.nan), subspaces], ignore_index=True)
+    errors = results.trained(reduced_reruns)[[*results.KEYS, results.ERROR]]
+    errors = errors.rename(columns={results.ERROR: "relative_error"})
+    runs = runs.drop(columns="relative_error")
+    runs = runs.merge(errors, on=results.KEYS, how="left", validate="one_to_one")
+    runs = pd.concat([_full_order_rows(full_order), runs], ignore_index=True)
     runs = runs.assign(h=runs.scene.map(time_steps), stiffness_ratio=1.0, experiment="rerun")
-    sweeps = results.joined(files["sweeps"]).assign(experiment="sweep")
-    rows = pd.concat([runs, sweeps], ignore_index=True)
+    rows = pd.concat([runs, sweeps.assign(experiment="sweep")], ignore_index=True)
     return rows.assign(outcome=outcomes(rows, wrong, departure), reference=results.ITERATIONS)
 
 
@@ -241,18 +239,6 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
     return made.assign(method="full", position_basis="full", energy_ratio=1.0, relative_error=0.0)
 
 
-def _rerun_rows(
-    reruns: list[File], subspaces: list[File], reduced_reruns: pd.DataFrame
-) -> pd.DataFrame:
-    """Rows of reduced runs of the training motion; errors cover the frames before the `Horizon`."""
-    local = results.joined(reruns).assign(position_basis="full", k=np.nan)
-    runs = pd.concat([local, results.joined(subspaces)], ignore_index=True)
-    runs = runs.drop(columns="relative_error")
-    errors = results.trained(reduced_reruns)[[*results.KEYS, "relative_error_within_horizon"]]
-    errors = errors.rename(columns={"relative_error_within_horizon": "relative_error"})
-    return runs.merge(errors, on=results.KEYS, how="left", validate="one_to_one")
-
-
 @table(
     title="Every reduction in every hard case",
     columns=(
@@ -266,8 +252,8 @@ def _rerun_rows(
         text("outcome", "how the reduction fared", compared="error", tolerance=FRAGILE),
         text("why", "of a refusal or a failure", compared="error", tolerance=FRAGILE),
     ),
-    reads={"parts": Every(paths.HARD_CASES)},
+    reads={"rows": Rows(paths.HARD_CASES)},
 )
-def hard_cases(parts: list[File]) -> pd.DataFrame:
-    """Rows of the files ``parts``: reductions in scenes with extreme meshes, states, settings."""
-    return results.joined(parts)
+def hard_cases(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the ``rows`` of all cases: reductions in scenes with extreme meshes, states, settings."""
+    return rows

@@ -5,11 +5,10 @@ import pandas as pd
 
 from pdrom.model.held_out import MOTIONS
 from study.artifact import paths
-from study.artifact.paths import File
-from study.artifact.reads import Every
 from study.experiments.error_budget import FULL_ORDER, PARTS, SPAN
 from study.tables.kit import results
 from study.tables.kit.declaration import flag, integer, number, shared, table, text
+from study.tables.kit.results import Rows
 
 MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIONS)}")
 
@@ -35,11 +34,10 @@ MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIO
         *shared("reference_error reference_deformation_error"),
         number("evaluations", "evaluations of a frame of the converged run", compared="error"),
     ),
-    reads={"references": Every(paths.REFERENCES)},
+    reads={"rows": Rows(paths.REFERENCES)},
 )
-def test_trajectories(references: list[File]) -> pd.DataFrame:
+def test_trajectories(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per scene and held-out motion; errors are before the horizon, of converged runs."""
-    rows = results.joined(references)
     return rows[rows.motion != results.TRAIN].assign(reference=results.CONVERGED)
 
 
@@ -65,16 +63,13 @@ def test_trajectories(references: list[File]) -> pd.DataFrame:
         flag("largest", "the part adds most, and more than 3 x the reference's own error"),
         *shared("reference_error reference_deformation_error"),
     ),
-    reads={"parts": Every(paths.ERROR_BUDGET), "references": Every(paths.REFERENCES)},
+    reads={"rows": Rows(paths.ERROR_BUDGET), "references": Rows(paths.REFERENCES)},
 )
-def error_budget(parts: list[File], references: list[File]) -> pd.DataFrame:
+def error_budget(rows: pd.DataFrame, references: pd.DataFrame) -> pd.DataFrame:
     """One row per test trajectory, model and part; parts of a reduced model follow one another.
 
     Where the reference moves rigidly, ``added`` is that of the position error.
     """
-    rows = results.joined(parts).assign(reference=results.CONVERGED)
-    if rows.empty:
-        return rows
     error = rows[results.DEFORMATION].fillna(rows.error).fillna(np.inf)
     before = error.shift().where(rows.part != SPAN, 0.0)
     own = rows.part != FULL_ORDER
@@ -82,7 +77,7 @@ def error_budget(parts: list[File], references: list[File]) -> pd.DataFrame:
         added = (error - before).where(own)
     trajectory = pd.Series(np.arange(len(rows)) // len(PARTS), rows.index)
     most = added == added.groupby(trajectory).transform("max")
-    known = results.joined(references)[["scene", "motion", *results.OWN_ERRORS]]
+    known = references[["scene", "motion", *results.OWN_ERRORS]]
     rows = rows.assign(added=added).merge(known, "left", ["scene", "motion"])
     least = rows.reference_deformation_error.fillna(rows.reference_error) / results.THIRD
-    return rows.assign(largest=most & (rows.added > least))
+    return rows.assign(largest=most & (rows.added > least), reference=results.CONVERGED)

@@ -246,7 +246,13 @@ class Table(Artifact):
     rule_pattern = "{}_table"
 
     def __call__(self, *arguments: Any, **named: Any) -> pd.DataFrame:
-        """Compute the table from its inputs and return it with the declared columns and types."""
+        """Compute the table from its inputs and return it with the declared columns and types.
+
+        A table has no rows if the first of its inputs is a frame without columns: nothing was made.
+        """
+        first = named.get(next(iter(self.reads)), *arguments[:1])
+        if isinstance(first, pd.DataFrame) and not len(first.columns):
+            return self.checked(first)
         return self.checked(self.function(*arguments, **named))
 
     def perform(

@@ -1,4 +1,4 @@
-"""Helpers for tables: times on a common scale, selections of reduced runs, medians over motions.
+"""Helpers for tables: rows of files, times on one scale, choices of runs, medians over motions.
 
 A job that times reduced runs of a scene, or runs without an effect, also times its full-order run,
 because machine speed differs between jobs. All times of a job are multiplied by one factor: time of
@@ -9,6 +9,7 @@ Errors over held-out motions are summarised by their median, as fixed in config/
 
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,7 @@ import pandas as pd
 from pdrom.core.store import read_table
 from pdrom.reduction.timing import PHASES
 from study.artifact.paths import File
+from study.artifact.reads import Every
 from study.tables.kit.declaration import Column, integer, number, text
 
 RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
@@ -36,7 +38,6 @@ COLUMNS = (
 )
 # Held-out motions are left out if the training run differs from theirs by at most this (relative).
 FAR = 0.3
-_WHOLE = {"k": "Int64", "r": "Int64"}
 EXPERIMENT = ["scene", "group"]
 MEASURES = POSITION, BOTH = "position", "both"
 MEASURE = text(
@@ -56,6 +57,18 @@ def joined(files: Iterable[File]) -> pd.DataFrame:
     """Rows of the tables in ``files``, in order; without any rows, a frame without columns."""
     parts = [part for part in (read_table(file.path) for file in files) if len(part)]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+
+
+class Rows(Every):
+    """Rows of all files of a kind: the function gets `joined` files. See `Table.__call__`."""
+
+    def content(self, paths: Any) -> Any:
+        return joined(super().content(paths))
+
+
+def with_whole_sizes(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return ``rows`` whose sizes k and r are integers, which may be missing, to join by them."""
+    return rows.astype({size: "Int64" for size in ("k", "r") if size in rows})
 
 
 DAY = text("recorded", "day on which config/extended.yaml recorded the row; empty: of this run")
@@ -92,14 +105,13 @@ def in_one_time(
     return table.assign(**{name: table[name] * factor for name in columns})
 
 
-def timings_in_one_time(timings: Sequence[File], times: pd.DataFrame) -> pd.DataFrame:
+def timings_in_one_time(timings: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     """Rows of ``timings``, scaled by `in_one_time` to the full-order frame times of ``times``."""
-    rows = joined(timings)
-    if rows.empty:
-        return rows
-    own = rows[rows.method.isna() & (rows.implementation == "compiled")]
+    if timings.empty:
+        return timings
+    own = timings[timings.method.isna() & (timings.implementation == "compiled")]
     own = own.set_index("scene").ms_per_frame
-    return in_one_time(rows, own, times, columns=[name for name in PHASES if name in rows])
+    return in_one_time(timings, own, times, [name for name in PHASES if name in timings])
 
 
 def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
@@ -152,10 +164,9 @@ def measured(rows: pd.DataFrame, measure: str) -> pd.DataFrame:
 
     It is the position error where there is no deformation error, as the reference moves rigidly.
     """
-    position = rows[ERROR].astype(float)
     if measure == POSITION:
         return rows
-    shape = rows[DEFORMATION].astype(float)
+    position, shape = rows[ERROR].astype(float), rows[DEFORMATION].astype(float)
     return rows.assign(**{ERROR: np.fmax(position, shape).where(position.notna())})
 
 
@@ -176,20 +187,18 @@ def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFra
     """
     ran = (reruns.frames > 0) | reruns.blowup_frame.notna()
     tests = (reruns.horizon_frame > 0) & (reruns.playback_error > FAR)
-    rows = reruns[(reruns.motion != TRAIN) & ran & tests]
-    rows = rows.astype({key: kind for key, kind in _WHOLE.items() if key in keys})
-    error, own = rows[ERROR].astype(float), [rows[key] for key in keys]
-    ended = error.isna()
-    runs = error.fillna(np.inf).groupby(own, sort=False, dropna=False)
-    made = runs.agg(**{MEDIAN: "median", LOW: "min", HIGH: "max", COUNT: "count"})
-    shape = rows[DEFORMATION].astype(float).mask(ended, np.inf)
-    beside = pd.DataFrame({SHAPE: shape, "playback_error": rows.playback_error})
-    return made.join(beside.groupby(own, sort=False, dropna=False).median()).reset_index()
+    rows = with_whole_sizes(reruns[(reruns.motion != TRAIN) & ran & tests])
+    error, shape = rows[ERROR].astype(float), rows[DEFORMATION].astype(float)
+    rows = rows.assign(error=error.fillna(np.inf), shape=shape.mask(error.isna(), np.inf))
+    ends = {MEDIAN: "median", LOW: "min", HIGH: "max", COUNT: "count"}
+    found = {name: ("error", end) for name, end in ends.items()}
+    found |= {SHAPE: ("shape", "median"), "playback_error": ("playback_error", "median")}
+    return rows.groupby(list(keys), sort=False, dropna=False).agg(**found).reset_index()
 
 
 def with_held_out(runs: pd.DataFrame, reruns: pd.DataFrame) -> pd.DataFrame:
     """Join ``runs`` with their errors over held-out motions, as `over_motions` computes them."""
-    own = runs.astype(_WHOLE).drop(columns="playback_error", errors="ignore")
+    own = with_whole_sizes(runs).drop(columns="playback_error", errors="ignore")
     return own.merge(over_motions(reruns), on=KEYS, how="left")
 
 
@@ -206,18 +215,15 @@ def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFr
     failed : whether the error exceeds `FAILED`
     """
     runs = trained(reruns)
-    runs = runs[(runs.position_basis == "full") & runs.max_extent.notna()].copy()
-    ended = runs.relative_error_within_horizon.isna() & runs.blowup_frame.notna()
-    runs["error"] = runs.relative_error_within_horizon.where(~ended, np.inf)
+    runs = runs[(runs.position_basis == "full") & runs.max_extent.notna()]
+    error = runs[ERROR].mask(runs[ERROR].isna() & runs.blowup_frame.notna(), np.inf)
+    runs = runs.assign(error=error, failed=error > FAILED)
     keys = [*EXPERIMENT, "method", "r"]
     train = reconstruction[reconstruction.split == "train"]
     runs = runs.merge(train[[*keys, "gain"]], on=keys, how="left").astype({"r": "int64"})
     orthogonal = runs.loc[runs.method == ORTHOGONAL, [*EXPERIMENT, "r", "error"]]
-    orthogonal = orthogonal.rename(columns={"error": "orthogonal_error"})
-    order = runs.assign(place=range(len(runs))).sort_values("r", kind="stable")
-    paired = pd.merge_asof(order, orthogonal.sort_values("r"), on="r", by=EXPERIMENT)
-    runs = paired.sort_values("place").drop(columns="place").reset_index(drop=True)
+    orthogonal = orthogonal.rename(columns={"error": "orthogonal_error"}).sort_values("r")
+    order = runs.reset_index().sort_values("r", kind="stable")
+    runs = pd.merge_asof(order, orthogonal, on="r", by=EXPERIMENT).sort_values("index")
     fine = (runs.orthogonal_error <= FAILED) & (runs.method != ORTHOGONAL) & runs.error.notna()
-    runs = runs[fine & runs.gain.notna()].copy()
-    runs["failed"] = runs.error > FAILED
-    return runs
+    return runs[fine & runs.gain.notna()].reset_index(drop=True)
