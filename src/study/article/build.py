@@ -2,13 +2,13 @@
 
 import base64
 import gzip
-import io
 import json
 import re
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
+from functools import partial
 from html import escape
 from importlib.util import find_spec
 from pathlib import Path
@@ -37,15 +37,15 @@ from study.tables.kit.declaration import QUANTITIES, TOLERANCES
 LOSSLESS, COPIED = 150_000, 200_000
 
 
-def shown_figure(
-    name: str, node: Node, size: tuple[int, int], with_pdf: bool, known: Collection[str]
-) -> Node:
+Drawn = Mapping[str, tuple[tuple[int, int], bool]]  # figure -> size in pixels, and has it a PDF?
+
+
+def shown_figure(name: str, node: Node, drawn: Drawn, known: Collection[str]) -> Node:
     """Return a figure as a node of pandoc's syntax tree: picture, caption, shell command, links.
 
-    node : node that pandoc made from the figure in the TeX source
-    with_pdf : whether the pages include a PDF of the figure
-    known : names of all tables that have a page
+    ``node`` is what pandoc made of it, ``known`` the names of all tables that have a page.
     """
+    size, with_pdf = drawn[name]
     attribute, caption, _ = node["c"]
     picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
     # a single text node: pandoc would hide a caption with the same nodes as the alternative text
@@ -62,13 +62,12 @@ def _origin(name: str, with_pdf: bool, known: Collection[str]) -> str:
     reads = declarations()[name].reads.values()
     tables = [r.name for r in reads if isinstance(r, TableOf) and r.name in known]
     data = ", ".join(f'<a href="tables/{table}.html">{table}</a>' for table in tables)
-    sentences = [
-        f"<code>./reproduce figure {name}</code>.",
-        f"Data: {data}." if tables else "Drawn from the runs themselves.",
-        f'<a href="figures/{name}.pdf">PDF</a>.' if with_pdf else "",
-        f'Last verification: <span data-verified="figure {name}">not yet</span>.',
-    ]
-    return " ".join(filter(None, sentences))
+    pdf = f'<a href="figures/{name}.pdf">PDF</a>. ' if with_pdf else ""
+    return (
+        f"<code>./reproduce figure {name}</code>. "
+        f"{f'Data: {data}.' if tables else 'Drawn from the runs themselves.'} {pdf}"
+        f'Last verification: <span data-verified="figure {name}">not yet</span>.'
+    )
 
 
 FACTS = {
@@ -89,16 +88,20 @@ def table_page(name: str, csv: bytes, template: str) -> str:
         f"<td>{f'{c.within:g}' if c.quantity in TOLERANCES else 'not judged'}</td></tr>"
         for c in (table.columns if table else ())
     )
-    packed = gzip.compress(csv, 9, mtime=0)
+    none = "<tr><td colspan=5>facts of the configuration, compared with nothing</td></tr>"
     parts = {
         "NAME": name,
-        "TITLE": escape(table.title if table else FACTS[name]),
+        "TITLE": escape(titles()[name]),
         "COMMAND": escape(f"./reproduce {argument(name)}"),
-        "COLUMNS": columns
-        or "<tr><td colspan=5>facts of the configuration, compared with nothing</td></tr>",
-        "DATA": base64.b64encode(packed).decode(),
+        "COLUMNS": columns or none,
+        "DATA": base64.b64encode(gzip.compress(csv, 9, mtime=0)).decode(),
     }
     return filled(template, parts)
+
+
+def titles() -> dict[str, str]:
+    """Mapping of the names of all tables that may have a page to their titles."""
+    return FACTS | {name: table.title for name, table in declared().items()}
 
 
 def argument(name: str) -> str:
@@ -183,10 +186,9 @@ VERIFIED, INDEX = "verified.js", "index.html"
 
 
 def write_verified(found: Mapping[str, str], folder: Path) -> None:
-    """Write the outcomes of ``./reproduce verify`` to a file in ``folder`` that all pages load.
+    """Write outcomes of ``./reproduce verify`` to a script in ``folder`` that all pages load.
 
-    ``found`` maps kind and name of a result, such as "table payoff", to its outcome. The file is a
-    script, because a page opened from a disk can load scripts but no data.
+    ``found`` maps kind and name of a result, such as "table payoff", to its outcome.
     """
     write_text(f"window.pdromVerified={safe_json(dict(found))};\n", folder / VERIFIED)
 
@@ -221,7 +223,7 @@ def write_article(
     inputs : generated files that the manuscript includes; numbers.json: table cells of its numbers
     figures, pictures : PDF and PNG of each figure
     made : rules of all tables, figures and pages of the study
-    added : name of a list of values in the file ``claims`` -> values that the study adds to it
+    claims, added : see `load_claims`
     assets : templates, style and script (files of `ASSETS`)
     """
     (numbers,) = (file.path for file in inputs if file["name"] == NUMBERS)
@@ -231,7 +233,6 @@ def write_article(
     csv = {table["name"]: Path(table.path).read_bytes() for table in tables}
     for name in known if hidden else FACTS:
         csv[name] = known[name].to_csv(index=False, lineterminator="\n").encode()
-    templates = {name: path.read_text("utf-8") for name, path in assets.items()}
     texts = documents(source[0].parent)
     pages = {
         name: PAGES[stem]
@@ -240,16 +241,14 @@ def write_article(
         if f"picture_{name}" in outputs
     }
     linked = {page: words for page, (words, rule) in LINKS.items() if rule in (*made, "")}
-    links = " ".join(f'<a href="{page}">{words}</a>' for page, words in linked.items())
-    plain = templates["plain"].replace("{{LINKS}}", links)
-    of_table = templates["table"].replace("{{LINKS}}", links.replace('href="', 'href="../'))
+    written = {name: path.read_text("utf-8") for name, path in assets.items()}
+    plain = written.pop("plain").replace("{{LINKS}}", _links(linked))
+    of_table = written.pop("table").replace("{{LINKS}}", _links(linked, "../"))
     rules = load_claims(claims, added)
-    written = {name: templates[name] for name in ("style", "script")}
     for name, content in csv.items():
         written[f"table_{name}"] = table_page(name, content, of_table)
-    titles = FACTS | {name: table.title for name, table in declared().items()}
     items = "".join(
-        f"<li><a href='tables/{name}.html'><code>{name}</code></a> {escape(titles[name])}</li>"
+        f"<li><a href='tables/{name}.html'><code>{name}</code></a> {escape(titles()[name])}</li>"
         for name in sorted(csv)
     )
     written["tables"] = filled(plain, {"TITLE": "Tables", "BODY": f"<ul>{items}</ul>"})
@@ -264,43 +263,41 @@ def write_article(
     trees: dict[str, Node] = {}
     for stem, text in texts.items():
         prefix = _PREFIX.search(text)
-        trees[stem] = numbered(
-            parsed(prepared(text, stem, origins, facts), files, references),
-            Labels(prefix[1] if prefix else "", PAGES[stem], labels),
-            lambda name, node: shown_figure(name, node, *drawn[name], csv),
-        )
+        counters = Labels(prefix[1] if prefix else "", PAGES[stem], labels)
+        tree = parsed(prepared(text, stem, origins, facts), files, references)
+        shown = partial(shown_figure, drawn=drawn, known=csv)
+        trees[stem] = numbered(tree, counters, shown)
+    del written["text"]
     for stem, tree in trees.items():
-        others = {PAGES[other]: TITLES[other] for other in texts if other != stem} | linked
-        links = " ".join(f'<a href="{address}">{words}</a>' for address, words in others.items())
-        variables = {"pages": links} | ({"part": escape(facts.part)} if facts.part else {})
+        others = {PAGES[other]: TITLES[other] for other in texts if other != stem}
+        variables = {"pages": _links(others | linked)}
+        variables |= {"part": escape(facts.part)} if facts.part else {}
         written[stem] = page(resolved(tree, labels, rules), assets["text"], variables)
     for name, text in written.items():
         write_text(text, outputs[name])
     write_verified({}, Path(outputs["main"]).parent)
 
 
-def _write_figures(
-    figures: list[File], pictures: list[File], outputs: Mapping[str, str]
-) -> dict[str, tuple[tuple[int, int], bool]]:
-    """Write WebP pictures, and PDFs if small; return name -> (size in pixels, PDF written?)."""
-    folder = Path(outputs["main"]).parent / "figures"
+def _links(pages: Mapping[str, str], above: str = "") -> str:
+    """HTML: links to ``pages`` (address -> words) from a page in their folder ``above`` its own."""
+    return " ".join(f'<a href="{above}{page}">{words}</a>' for page, words in pages.items())
+
+
+def _write_figures(figures: list[File], pictures: list[File], outputs: Mapping[str, str]) -> Drawn:
+    """Write WebP pictures, and PDFs if small."""
     png = {picture["name"]: Path(picture.path) for picture in pictures}
     made = {}
     for name, pdf in sorted((figure["name"], Path(figure.path)) for figure in figures):
         require_intact(png[name])
+        require_intact(pdf)
         with Image.open(png[name]) as image:
             drawn = image.convert("RGB")
-        packed = io.BytesIO()
-        drawn.save(packed, "WEBP", lossless=True, method=3)
-        if packed.tell() > LOSSLESS:
-            packed = io.BytesIO()
-            drawn.save(packed, "WEBP", quality=85, method=4)
         with atomic_path(outputs[f"picture_{name}"]) as temporary:
-            temporary.write_bytes(packed.getvalue())
-        require_intact(pdf)
-        small = pdf.stat().st_size <= COPIED
-        if small:
-            with atomic_path(folder / f"{name}.pdf") as temporary:
+            drawn.save(temporary, "WEBP", lossless=True, method=3)
+            if temporary.stat().st_size > LOSSLESS:
+                drawn.save(temporary, "WEBP", quality=85, method=4)
+        if small := pdf.stat().st_size <= COPIED:
+            with atomic_path(Path(outputs["main"]).parent / "figures" / pdf.name) as temporary:
                 shutil.copyfile(pdf, temporary)
         made[name] = (drawn.size, small)
     return made
@@ -318,25 +315,19 @@ LIMIT = 300.0  # time limit of pandoc, s; a TeX definition that expands to itsel
 def parsed(text: str, files: Mapping[str, str], references: Path) -> Node:
     r"""Return pandoc's syntax tree of the LaTeX source ``text`` and of its bibliography.
 
-    Raises PaperError if pandoc is not installed, or if it rejects the source.
-
-    files : name -> content of each file that the source reads by ``\input``
-    references : path of the BibTeX file
+    ``files`` are those that the source reads by ``\input``, name -> content. Raises PaperError if
+    pandoc is not installed, or if it rejects the source.
     """
     with tempfile.TemporaryDirectory(prefix="pdrom-pandoc-") as folder:
         for name, content in {**files, "article.tex": text}.items():
             Path(folder, name).write_text(content, encoding="utf-8")
         words = ["-f", "latex", "-t", "json", "--citeproc", "-M", "link-citations=true"]
         words += ["--bibliography", str(references.resolve()), "article.tex"]
-        tree: Node = json.loads(_run(words, folder, ""))
-        return tree
+        return dict(json.loads(_run(words, folder, "")))
 
 
 def page(tree: Node, template: Path, variables: Mapping[str, str]) -> str:
-    """Return the HTML page that pandoc makes of ``tree`` by its ``template`` and ``variables``.
-
-    Formulas become MathML, and a table of contents comes first. Raises PaperError if pandoc fails.
-    """
+    """Return the HTML page that pandoc makes of ``tree`` by its ``template`` and ``variables``."""
     words = ["-f", "json", "-t", "html5", "--mathml", "--wrap=none", "--toc", "--toc-depth=2"]
     words += ["--standalone", "--shift-heading-level-by=1", f"--template={template.resolve()}"]
     words += [word for name, value in variables.items() for word in ("-V", f"{name}={value}")]

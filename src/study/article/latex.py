@@ -100,10 +100,9 @@ def _link(key: str, text: str) -> str:
 def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the TeX ``table`` with its numbers as links to rows of the study's tables.
 
-    All links lead to one table: the one of ``tables`` with most columns in common with ``table``.
-    If both have the same number of rows, row i is linked to row i there. Otherwise a row is linked
-    to the rows with equal cells in common columns; columns in which no row has an equal cell
-    (rounded numbers, sums, titles) are ignored.
+    All links lead to the one of ``tables`` with most columns in common with ``table``: to row i
+    from row i if both have as many rows, or else to the rows with equal cells in common columns, but
+    for columns in which no row has an equal cell (rounded numbers, sums, titles).
     """
     (columns, header), *body = table
     origin = max(tables, key=lambda name: len({*header} & {*tables[name]}))
@@ -144,10 +143,8 @@ def plain_columns(text: str) -> str:
     """Reduce the column definitions of all tables in ``text`` to letters that pandoc can read."""
     pieces, start = [], 0
     for found in _SPEC.finditer(text):
-        end = closing(text, found.end() + 1)
-        spec = text[found.end() + 1 : end]
-        spec = re.sub(r"[><@!]\{(?:[^{}]|\{[^{}]*\})*\}", "", spec)
-        spec = re.sub(r"[pm]\{[^{}]*\}|[XYZ]", "l", spec)
-        pieces += [text[start : found.end() + 1], spec]
+        begin, end = found.end() + 1, closing(text, found.end() + 1)
+        spec = re.sub(r"[><@!]\{(?:[^{}]|\{[^{}]*\})*\}", "", text[begin:end])
+        pieces += [text[start:begin], re.sub(r"[pm]\{[^{}]*\}|[XYZ]", "l", spec)]
         start = end
     return "".join([*pieces, text[start:]])

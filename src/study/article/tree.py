@@ -14,10 +14,7 @@ Node = dict[str, Any]  # a node of the syntax tree, or the whole tree
 
 
 def attributes(identifier: str = "", classes: str = "", **keys: str) -> list[Any]:
-    """Return the attributes of a node in the form of pandoc's syntax tree.
-
-    ``classes`` are separated by spaces; ``keys`` are further attributes, with "_" in place of "-".
-    """
+    """Return attributes of a node: ``classes`` separated by spaces, ``keys`` with "_" for "-"."""
     return [identifier, classes.split(), [[k.replace("_", "-"), v] for k, v in keys.items()]]
 
 
@@ -58,11 +55,7 @@ def plain(node: Any) -> str:
 
 
 def changed(node: Any, visit: Callable[[Node], Any]) -> Any:
-    """Return a tree in which ``visit`` has replaced nodes.
-
-    A node remains if ``visit`` returns None, and is replaced by several if it returns a list.
-    Replacements are not visited again.
-    """
+    """Return a tree in which ``visit`` has replaced nodes by one or a list, or kept them (None)."""
     if isinstance(node, list):
         made: list[Any] = []
         for each in node:
@@ -118,8 +111,7 @@ class Labels:
 def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> Node:
     """Number sections, figures, tables, equations and theorems of ``tree``; lay them out for HTML.
 
-    labels : counters, which receive the number of every TeX label
-    shown : function of a figure's name and numbered node; returns the node that replaces it
+    ``labels`` get the number of every TeX label; ``shown`` replaces a figure's name and node.
     """
 
     def visit(node: Node) -> Any:
@@ -194,10 +186,8 @@ def _equation(node: Node, labels: Labels) -> Node:
 def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Node:
     """Turn references, table values and claim names into links; put paragraph headings in line.
 
-    Raises PaperError if the text refers to a label that no document has.
-
-    labels : TeX label -> (number, page)
-    claims : mapping whose keys are the names of the claims in the text, such as "C4"
+    ``labels`` map TeX labels to (number, page); PaperError if the text refers to another one. The
+    keys of ``claims`` are the names of the claims in the text, such as "C4".
     """
 
     def visit(node: Node) -> Any:

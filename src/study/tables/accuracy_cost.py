@@ -15,7 +15,7 @@ from pdrom.reduction.settings import COARSER, COARSER_ANDERSON, pareto
 from study.artifact import paths
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
-from study.tables.kit import results
+from study.tables.kit import declaration, results
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, timed
 from study.tables.kit.results import DEFORMATION, ERROR, EXPERIMENT, FAILED, Rows
 
@@ -32,8 +32,7 @@ _POINT = [ERROR, "ms_per_frame"]
         integer("vertices", "vertices of the mesh that is simulated"),
         *shared("relative_error_within_horizon deformation_error ms_per_frame"),
         timed(flag("pareto", "no point of the scene is as good in error and time, better in one")),
-        results.REFERENCE,
-        *shared("reference_error reference_deformation_error mesh_error"),
+        *shared("reference reference_error reference_deformation_error mesh_error"),
         *results.COLUMNS,
         *shared("velocity_error energy_drift"),
     ),
@@ -66,7 +65,7 @@ def accuracy_cost(
     points = points.assign(iterations=points.scene.map(iterations), vertices=vertices)
     points = results.with_held_out(points.assign(mesh_error=None), reduced)
     parts = [part for part in (own, points, sweep) if len(part)]
-    points = pd.concat(parts or [points], ignore_index=True).assign(reference=results.CONVERGED)
+    points = pd.concat(parts or [points], ignore_index=True).assign(reference=declaration.CONVERGED)
     for _, rows in points.groupby("scene", sort=False):
         points.loc[rows.index, "pareto"] = pareto(*rows[_POINT].to_numpy(float).T)
     order = {scene: place for place, scene in enumerate(iterations)}
@@ -96,9 +95,7 @@ SHARE = 1e-3  # table payoff omits groups with at most this share of all forces 
 @table(
     title="Reduced local steps against the full one, and where they stop paying",
     columns=(
-        *shared("scene group method"),
-        number("factor", "on the vertices along a side of the scene's own mesh", compared="exact"),
-        *shared("vertices elements r"),
+        *shared("scene group method factor vertices elements r"),
         timed(number("local_ms", "time of the reduced local step", "ms")),
         timed(number("full_ms", "time of the full local step of the group", "ms")),
         timed(number("ratio", "the first over the second")),
@@ -109,12 +106,7 @@ SHARE = 1e-3  # table payoff omits groups with at most this share of all forces 
     reads={"own": Every(paths.BREAK_EVEN), "sized": Every(paths.BREAK_EVEN_SIZED)},
 )
 def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
-    """One row per scene, group, method, mesh and size r: local-step times and break-even size.
-
-    ``breakeven_r``, the size from which on the reduction is not faster, is equal in rows that only
-    differ in r. It is empty if the reduction is faster at the largest size (full rank), and the
-    smallest size if it is never faster.
-    """
+    """One row per scene, group, method, mesh and size r: local-step times, and `break_even`."""
     rows = results.joined([*own, *(file for file in sized if file["factor"] != OWN_MESH)])
     if rows.empty:
         return rows
@@ -149,8 +141,7 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     title="Where reductions pay and where they lose to the full order",
     columns=(
         results.MEASURE,
-        results.REFERENCE,
-        *shared("position_basis method"),
+        *shared("reference position_basis method"),
         count(
             "scenes", "scenes (and groups) with a timed run, whose reference is known well enough"
         ),
@@ -181,18 +172,17 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
     For each scene and group, a size is chosen in the training motion (that of the fastest accurate
     run, or else of the most accurate run) and evaluated on held-out motions. Groups with at most
     `SHARE` of all forces in a scene are left out. The first rows are the full order with fewer
-    iterations and on coarser meshes (from ``points``); as they need no training, their
-    held-out columns are empty. Errors are those against the converged run; motions in which it
-    is not known well enough are left out. Speed-ups are relative to the scene's own full-order run.
+    iterations and on coarser meshes (from ``points``), which need no training. Motions whose
+    converged run is not known well enough are left out.
     """
     shares = effects.set_index(["scene", "effect"]).force_share
     weak = shares.index[shares <= SHARE]
     found = []
     for measure in results.MEASURES:
-        runs = results.against_converged(reruns), _full_order(points)
-        judged = (results.judged_by(rows, measure, FAILED) for rows in runs)
-        found += [{"measure": measure, **row} for row in _summaries(*judged, weak)]
-    return pd.DataFrame(found).assign(reference=results.CONVERGED)
+        judged = results.judged_by(results.against_converged(reruns), measure, FAILED)
+        whole = results.judged_by(_full_order(points), measure, FAILED)
+        found += [{"measure": measure, **row} for row in _summaries(judged, whole, weak)]
+    return pd.DataFrame(found).assign(reference=declaration.CONVERGED)
 
 
 def _summaries(

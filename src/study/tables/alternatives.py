@@ -11,35 +11,27 @@ from study.artifact import paths
 from study.artifact.reads import Every, Recorded
 from study.experiments.alternatives import experiment as settings
 from study.tables.kit import results
-from study.tables.kit.declaration import flag, integer, number, shared, table, text, timed
+from study.tables.kit.declaration import estimate, flag, integer, number, shared, table, text, timed
 from study.tables.kit.results import Rows
 
-FACTOR = number("factor", "on the vertices along a side of the scene's own mesh", compared="exact")
-STIFFNESS = number("stiffness", "factor on all weights of the scene", compared="exact")
-RATIO = "time of a frame over that of ten plain iterations of projective dynamics on its own mesh"
-VERTICES_RATIO = "of it, the positions of all vertices"
-OFFLINE_RATIO = "time of its training over that of one plain frame"
 ITERATIONS = integer("iterations", "iterations of each substep; empty: as many as converge")
-TRAINING = integer("training_motions", "trajectories that a reduced model is trained on")
 MOTION = text("motion", f"test trajectory, one of: {', '.join(MOTIONS)}")
 # Columns of a test trajectory in a scene; of one setting in it.
 CASE = ["scene", "factor", "stiffness", "motion"]
 KEYS = [*CASE, *settings.SETTING]
 PLAIN, TEN = "projective", 10  # method and iterations that times are compared with
 
-# Relative difference of errors that is allowed between machines: rounding errors decide which steps
-# the two-level methods reject.
-ERROR_TOLERANCE = 0.3
-estimated = partial(replace, *shared("reference_error"))  # column of errors of a reference
+# Makes a column of errors, whose relative difference between machines is larger: rounding errors
+# decide which steps the two-level methods reject.
+error = partial(number, tolerance=0.3)
 
 
 @table(
     title="Error and time of the alternatives to projective dynamics",
     columns=(
-        *shared("scene"),
-        FACTOR,
+        *shared("scene factor"),
         integer("vertices", "vertices of the mesh that is simulated"),
-        STIFFNESS,
+        *shared("stiffness"),
         text(
             "method",
             f"how a frame is solved; {settings.CONVERGED}: to a tolerance; {PLAYBACK}: the "
@@ -48,28 +40,20 @@ estimated = partial(replace, *shared("reference_error"))  # column of errors of 
         ),
         integer("substeps", "steps that a frame is divided into"),
         ITERATIONS,
-        TRAINING,
+        *shared("training_motions"),
         timed(number("offline_s", "processor time of its training, full-order runs included", "s")),
-        *shared("k"),
-        integer("skinning", "skinning columns beside its modes"),
+        *shared("k skinning"),
         number("tolerance", "sampling tolerance of its elements", compared="exact"),
         *shared("elements_sampled training_residual"),
         replace(MOTION, meaning=f"{MOTION.meaning}, or a validation trajectory"),
         integer("frames", "frames that errors are taken over"),
         flag("finite", "no frame blew up", compared="error"),
-        *shared("ms_per_frame vertices_ms"),
-        timed(number("time_ratio", RATIO)),
-        timed(number("vertices_ratio", VERTICES_RATIO)),
-        timed(number("offline_ratio", OFFLINE_RATIO)),
+        *shared("ms_per_frame vertices_ms time_ratio vertices_ratio offline_ratio"),
         integer("processes", "processes that timed it in this trajectory"),
-        number("error_implicit", "against the converged step", tolerance=ERROR_TOLERANCE),
-        number(
-            "deformation_error",
-            "deformation error against the converged step",
-            tolerance=ERROR_TOLERANCE,
-        ),
-        estimated(name="implicit_error", meaning="of the converged step, by a much finer solve"),
-        estimated(name="implicit_deformation_error", meaning="of its shapes"),
+        error("error_implicit", "against the converged step"),
+        error("deformation_error", "deformation error against the converged step"),
+        estimate("implicit_error", "of the converged step, by a much finer solve"),
+        estimate("implicit_deformation_error", "of its shapes"),
         *shared("mesh_error"),
         results.DAY,
     ),
@@ -79,9 +63,7 @@ estimated = partial(replace, *shared("reference_error"))  # column of errors of 
         "record": Recorded("alternatives"),
     },
 )
-def alternatives(
-    parts: list[paths.File], times: pd.DataFrame, record: list[Path]
-) -> pd.DataFrame:
+def alternatives(parts: list[paths.File], times: pd.DataFrame, record: list[Path]) -> pd.DataFrame:
     """One row per trajectory and setting (a method with its numbers), in the order of ``parts``.
 
     Times are medians over all timing processes. `with_recorded` appends rows of ``record``.

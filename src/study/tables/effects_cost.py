@@ -8,7 +8,7 @@ from study.artifact.reads import Setting, TableOf
 from study.experiments.frame_times import CONTROL, FULL, REDUCED
 from study.experiments.kit.base import FOM, GLOBAL, REST, RIGHT, Horizon, floor_of, horizons
 from study.experiments.sensitivity import without
-from study.tables.kit import results
+from study.tables.kit import declaration, results
 from study.tables.kit.declaration import flag, integer, interval, number, shared, table, text, timed
 from study.tables.kit.results import Rows, with_whole_sizes
 
@@ -60,9 +60,8 @@ def effects_cost(
 ) -> pd.DataFrame:  # fmt: skip
     """One row per effect or phase of a scene, then one per set of effects left out together.
 
-    Phases are right-hand side, global solve and the rest. Column ``moved`` (largest difference of
-    runs with and without the effect) is empty for a scene's only constraint group: no run lacks it.
-    Times are scaled to those in ``frame_times`` (`in_one_time`).
+    Column ``moved`` is empty for a scene's only constraint group: no run lacks it. Times are scaled
+    to those in ``frame_times`` (`in_one_time`).
     """
     own = costs.groupby("scene").ms_per_frame.sum()
     costs = results.in_one_time(costs, own, frame_times, columns=["ms_per_frame"])
@@ -160,11 +159,8 @@ def local_share(timings: pd.DataFrame, frame_times: pd.DataFrame) -> pd.DataFram
 def scaling(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per scene, mesh size and method.
 
-    Compiled code runs the local step and the solve of ecsw as one, whose time counts as local, so
-    that local_share is the share of all iterations there.
-
-    The exponent is fitted in logarithms to all meshes of a scene and method. It is empty for fewer
-    than three meshes: any two points fit a power law.
+    The exponent is fitted in logarithms to all meshes of a scene and method, if there are at least
+    three: any two points fit a power law.
     """
     own = rows[rows.method == FOM].set_index(["scene", "vertices"])
     mesh = pd.MultiIndex.from_frame(rows[["scene", "vertices"]])
@@ -244,7 +240,7 @@ def frame_times(rows: pd.DataFrame) -> pd.DataFrame:
         timed(number("training_s", "time of the training run", "s")),
         timed(number("reduction_s", "processor time of basis and sampling", "s")),
         timed(number("frames_to_break_even", "frames that pay both back; none if never")),
-        results.REFERENCE,
+        *shared("reference"),
         number("error_train", "of the training motion before the horizon (large: over all)"),
         number("deformation_train", "deformation error over the same frames"),
         *results.COLUMNS,
@@ -277,7 +273,7 @@ def speedups(
     ]
     made = pd.concat([part for part in parts if len(part)]).sort_index()
     of_large = ~made.scene.isin(reruns.scene)
-    made["reference"] = of_large.map({True: results.ITERATIONS, False: results.CONVERGED})
+    made["reference"] = of_large.map({True: declaration.ITERATIONS, False: declaration.CONVERGED})
     made["training_s"] = 1e-3 * made.full_ms * made.frames
     saved = made.full_ms - made.ms_per_frame
     paid = 1e3 * (made.training_s + made.reduction_s) / saved
@@ -320,10 +316,9 @@ def confirmed(times: pd.DataFrame) -> pd.Series:
 
 
 def unreliable(times: pd.DataFrame) -> bool:
-    """Return whether table frame_times (``times``) says that no time of the run can be trusted.
+    """Return whether the table frame_times (``times``) has times that cannot be trusted.
 
-    That is so if processes that measured had less than `ENOUGH` of a processor, or if the controls
-    of most scenes do not confirm their times.
+    Its processes had less than `ENOUGH` of a processor, or most controls do not confirm the times.
     """
     enough = times.processor_share.median() >= ENOUGH and confirmed(times).mean() >= 0.5
     return len(times) > 0 and not enough
@@ -348,8 +343,7 @@ def large_errors(large: pd.DataFrame) -> pd.DataFrame:
         integer("elements", "elements of all groups"),
         *shared("position_basis k"),
         number("tau", "tolerance of the element sampling", compared="exact"),
-        *shared("elements_sampled training_residual"),
-        results.REFERENCE,
+        *shared("elements_sampled training_residual reference"),
         number("relative_error_train", "error of the positions in the training motion"),
         number("deformation_train", "deformation error there"),
         number("relative_error_heldout", "the same in held-out motions: their median"),
@@ -368,7 +362,7 @@ def large_errors(large: pd.DataFrame) -> pd.DataFrame:
 def online(rows: pd.DataFrame, measured: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     """One row per model of a large scene: errors in ``rows``, times in ``measured``, ``times``."""
     made = results.trained(rows).rename(columns={"r": "elements_sampled"})
-    made = made.assign(reference=results.ITERATIONS)
+    made = made.assign(reference=declaration.ITERATIONS)
     made = made.drop(columns="playback_error")  # zero, as playback repeats the training motion
     found = timed_reductions(measured, times)[[*_MODEL, *_TIMES]]
     for source in (large_errors(rows).rename(columns=_ERRORS), found):

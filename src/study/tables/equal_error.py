@@ -17,9 +17,8 @@ from study.artifact import paths
 from study.artifact.reads import Recorded, Setting, TableOf
 from study.experiments.alternatives.experiment import CONVERGED, REDUCTIONS, SETTING, ReducedModel
 from study.tables import alternatives as runs
-from study.tables.kit import results
-from study.tables.kit.declaration import Column, flag, integer, interval, number, shared, table
-from study.tables.kit.declaration import text, timed
+from study.tables.kit import declaration, results
+from study.tables.kit.declaration import estimate, flag, integer, number, shared, table, text, timed
 from study.tables.kit.results import Rows
 
 # The reduced model of `equal_error`; where a recording holds fewer modes, the nearest number.
@@ -30,11 +29,12 @@ AHEAD = {
     "ahead": "validation_error", "ahead_test": "position_error",
     "ahead_deformation": "deformation_error",
 }  # fmt: skip
+(RATIO,) = shared("time_ratio")
 PARTS = REDUCED, COARSER, SAME = "reduced", "coarser mesh", "same mesh"
 OWN = integer("vertices", "vertices of the scene's own mesh")
 
 
-def opponent(prefix: str, where: str) -> list[Column]:
+def opponent(prefix: str, where: str) -> list[declaration.Column]:
     """Columns, named by ``prefix``, of the fastest full-order setting and the speed-up over it."""
     made = [
         text("method", f"fastest full-order setting {where} with at most this position error"),
@@ -43,7 +43,7 @@ def opponent(prefix: str, where: str) -> list[Column]:
         integer("iterations", "its iterations of each"),
         number("error", "its position error"),
         number("speedup", "its time over that of the reduced model in a process, median"),
-        *interval("speedup_low speedup_high"),
+        *declaration.interval("speedup_low speedup_high"),
         flag("reached", "a setting is as accurate; otherwise the most accurate one is taken"),
     ]
     return [timed(replace(column, name=f"{prefix}_{column.name}")) for column in made]
@@ -52,24 +52,19 @@ def opponent(prefix: str, where: str) -> list[Column]:
 @table(
     title="Speed-ups over full-order settings that are at least as accurate",
     columns=(
-        *shared("scene"),
-        runs.FACTOR,
+        *shared("scene factor"),
         OWN,
-        runs.STIFFNESS,
+        *shared("stiffness"),
         runs.MOTION,
         text("elements", "what the scene's constraints act on: springs, triangles or tetrahedra"),
         text("method", "reduced model: ecsw with few iterations, ecsw-newton to a tolerance"),
         runs.ITERATIONS,
-        runs.TRAINING,
-        *shared("k"),
+        *shared("training_motions k"),
         number("position_error", "of all frames, against the converged step; inf if it blew up"),
         *shared("deformation_error"),
-        runs.estimated(name="implicit_error", meaning="position error of the converged step"),
+        estimate("implicit_error", "position error of the converged step"),
         flag("known", "which is at most a third of the position error", compared="error"),
-        timed(number("time_ratio", runs.RATIO)),
-        timed(number("vertices_ratio", runs.VERTICES_RATIO)),
-        timed(number("offline_ratio", runs.OFFLINE_RATIO)),
-        *shared("mesh_error"),
+        *shared("time_ratio vertices_ratio offline_ratio mesh_error"),
         *opponent("same", "on the same mesh"),
         *opponent("coarser", "on the same or a coarser mesh"),
         timed(number("pays_after", "frames after which it has paid off its training beside that")),
@@ -152,8 +147,7 @@ def _beside(full: pd.DataFrame, model: Any, ms: pd.DataFrame, prefix: str) -> di
 @table(
     title="The best settings of a scene, chosen on validation trajectories",
     columns=(
-        *shared("scene"),
-        runs.FACTOR,
+        *shared("scene factor"),
         OWN,
         text("part", f"settings that the row is the best of, one of: {', '.join(PARTS)}"),
         *map(
@@ -162,16 +156,15 @@ def _beside(full: pd.DataFrame, model: Any, ms: pd.DataFrame, prefix: str) -> di
                 text("method", "how a frame is solved, see alternatives"),
                 integer("simulated", "vertices of the mesh that is simulated"),
                 runs.ITERATIONS,
-                *shared("k"),
-                integer("skinning", "skinning columns beside its modes"),
+                *shared("k skinning"),
                 number("tolerance", "sampling tolerance of its elements"),
-                runs.TRAINING,
+                *shared("training_motions"),
                 number("validation_error", "largest position error of a validation trajectory"),
                 number("validation_deformation", "the largest deformation error of one"),
                 number("position_error", "largest position error of a test trajectory"),
                 number("deformation_error", "the largest deformation error of one"),
-                number("time_ratio", f"{runs.RATIO}, median"),
-                number("offline_ratio", runs.OFFLINE_RATIO),
+                replace(RATIO, meaning=f"{RATIO.meaning}, median"),
+                *shared("offline_ratio"),
                 number(
                     "ahead",
                     "time of the fastest full-order setting on any mesh with at most this "

@@ -1,11 +1,10 @@
 """Tables of errors: of reconstructions, of perturbed runs, and of runs with one changed choice.
 
 The gain is the factor by which sampling amplifies errors. Table gain_interventions shows whether
-the error of a run falls if only its gain is lowered; a correlation of error and gain over all
-methods could have other causes. So each step compares two methods with equal basis and size r that
-differ in their samples, or in whether the axes x, y and z share coefficients (table ladder combines
-rows or elements with both). If separate coefficients raise errors only by their larger gain, errors
-must also fall with the gain between methods that all have separate, or all shared ones (`KINDS`).
+the error of a run falls if only its gain is lowered: each step compares two methods with one basis
+and size r that differ in their samples, or in whether the axes x, y and z share coefficients. If
+separate coefficients raise errors only by their gain, errors must also fall with the gain between
+methods that all have separate, or all shared ones (`KINDS`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -101,15 +100,14 @@ def sensitivity(rows: pd.DataFrame) -> pd.DataFrame:
         integer("rank", "modes that the snapshots have without a cutoff", compared="value"),
         # modes made of round-off, and thus their gain (error amplification), depend on the machine
         replace(*shared("gain"), compared="skipped"),
-        *shared("frames finite blowup_frame"),
-        results.REFERENCE,
+        *shared("frames finite blowup_frame reference"),
         number("relative_error", "error of the positions over all frames up to the horizon"),
     ),
     reads={"rows": Rows(paths.NOISE)},
 )
 def noise(rows: pd.DataFrame) -> pd.DataFrame:
     """Return the ``rows`` of all scenes and groups: runs with bases made of round-off."""
-    return rows.assign(reference=results.ITERATIONS)
+    return rows.assign(reference=declaration.ITERATIONS)
 
 
 @table(
@@ -119,7 +117,7 @@ def noise(rows: pd.DataFrame) -> pd.DataFrame:
         text("varied", "training (frames), start; held-out motions, with the number trained on"),
         integer("repetitions", "runs; their range encloses the median of all but by 2^(1 - n)"),
         integer("ended", "runs that ended early, with an infinite error", compared="error"),
-        results.REFERENCE,
+        *shared("reference"),
         number("error_median", "median of the errors of the positions before the horizon"),
         *declaration.extremes("error"),
         number("gain_median", "median of the gains"),
@@ -129,17 +127,13 @@ def noise(rows: pd.DataFrame) -> pd.DataFrame:
     reads={"rows": Rows(paths.REPETITIONS)},
 )
 def repetitions(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row per scene, group, method, r and ``varied``, the choice in which repeated runs differ.
-
-    The median of any distribution lies outside the range of n independent draws with probability
-    2^(1 - n): five draws enclose it with probability 15/16.
-    """
+    """One row per scene, group, method, r and ``varied``: in what repeated runs differ."""
     cells = rows.assign(infinite=np.isinf(rows.error)).groupby(_CELL, sort=False)
     ends = {"median": "median", "low": "min", "high": "max"}
     found = {f"{n}_{end}": (n, how) for n in ("error", "gain") for end, how in ends.items()}
     made = cells.agg(repetitions=("error", "size"), ended=("infinite", "sum"), **found)
     spread = made.error_high / made.error_low
-    return made.assign(spread=spread, reference=results.ITERATIONS).reset_index()
+    return made.assign(spread=spread, reference=declaration.ITERATIONS).reset_index()
 
 
 @table(
@@ -159,9 +153,7 @@ def repetitions(rows: pd.DataFrame) -> pd.DataFrame:
         *shared("gain"),
         number("error_train", "reconstruction error of the training snapshots"),
         number("error_heldout", "the same of the held-out motion"),
-        *shared("finite blowup_frame"),
-        results.REFERENCE,
-        *shared("relative_error_within_horizon"),
+        *shared("finite blowup_frame reference relative_error_within_horizon"),
         integer("repetitions", "runs trained on other frames, where they were repeated"),
         number("error_median", "median of their errors; inf for a run that ended early"),
         *declaration.extremes("error"),
@@ -171,7 +163,7 @@ def repetitions(rows: pd.DataFrame) -> pd.DataFrame:
 )
 def ladder(rows: pd.DataFrame) -> pd.DataFrame:
     """Return the ``rows`` of all scenes and groups."""
-    return rows.assign(reference=results.ITERATIONS)
+    return rows.assign(reference=declaration.ITERATIONS)
 
 
 # Step that changes samples, in table gain_interventions -> (method before it, method after it).
@@ -217,7 +209,7 @@ share = partial(number, compared="share")
         count("failing_after", "pairs whose error after exceeds a tenth"),
         share("error_before", "median of the error before; inf for a run that ended early"),
         share("error_after", "median of the error after"),
-        results.REFERENCE,
+        *shared("reference"),
         share("gain_ratio", "median of the gain after over that before"),
         share("error_ratio", "median of the error of the run after over that before"),
         *declaration.interval("error_ratio_low error_ratio_high", share),
@@ -237,10 +229,9 @@ def gain_interventions(
 ) -> pd.DataFrame:
     """One row for each step (change of method that lowers the gain) and kind of mesh.
 
-    The gain is the factor by which sampling amplifies errors. A scene and its variant ("twin") are
-    a family with dependent results: the bootstrap resamples families, the sign test counts them.
-    Errors below the sensitivity floor, by which perturbed runs differ, are raised to it. A run that
-    ended early has an infinite error; two such runs are not compared.
+    A scene and its variant ("twin") are a family: the bootstrap resamples families, the sign test
+    counts them. Errors below the sensitivity floor are raised to it. A run that ended early has an
+    infinite error; two such runs are not compared.
     """
     runs = results.judged_runs(reruns, reconstruction)
     rows = []
@@ -251,7 +242,7 @@ def gain_interventions(
             if len(own):
                 labels = zip(("step", "method_before", "method_after"), names, strict=True)
                 rows.append({**dict(labels), "mesh": mesh, **_summary(own)})
-    return pd.DataFrame(rows).assign(reference=results.ITERATIONS)
+    return pd.DataFrame(rows).assign(reference=declaration.ITERATIONS)
 
 
 def _steps(
@@ -311,14 +302,13 @@ def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
         "failing": int(failing.sum()),
         "rescued": int((failing & ~after).sum()),
         "failing_after": int(after.sum()),
-        "error_before": float(pairs.error_before.median()),
-        "error_after": float(pairs.error_after.median()),
-        "gain_ratio": float(pairs.gain.median()),
-        "error_ratio": float(pairs.error.median()),
-        "error_ratio_low": float(low),
-        "error_ratio_high": float(high),
-        "p_value": float(binomtest(fallen, by_family.ngroups).pvalue),
+        **pairs[["error_before", "error_after"]].median(),
+        "gain_ratio": pairs.gain.median(),
+        "error_ratio": pairs.error.median(),
+        "error_ratio_low": low,
+        "error_ratio_high": high,
+        "p_value": binomtest(fallen, by_family.ngroups).pvalue,
         "families": by_family.ngroups,
         "families_fallen": fallen,
-        "unexplained_share": float(((pairs.gain < 1.0) != (pairs.error < 1.0)).mean()),
+        "unexplained_share": ((pairs.gain < 1.0) != (pairs.error < 1.0)).mean(),
     }

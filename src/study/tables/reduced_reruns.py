@@ -15,25 +15,22 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import TRAIN, Horizon, floor_of, horizons
-from study.tables.kit import results
+from study.tables.kit import declaration, results
 from study.tables.kit.declaration import flag, number, shared, table, text
 from study.tables.kit.results import Rows
 
 _NAMES = ["scene", "group", "method", "position_basis"]
 
+
 @table(
     title="Reduced runs of the training and the held-out motions",
     columns=(
         *shared("scene group method position_basis k r frames finite blowup_frame max_extent"),
-        *shared("training_residual"),
-        *shared("relative_error relative_error_within_horizon deformation_error playback_error"),
-        results.REFERENCE,
-        *shared("error_converged deformation_converged"),
-        *shared("reference_error reference_deformation_error"),
-        *shared("horizon_frame sensitivity_floor"),
+        *shared("training_residual relative_error relative_error_within_horizon"),
+        *shared("deformation_error playback_error reference error_converged deformation_converged"),
+        *shared("reference_error reference_deformation_error horizon_frame sensitivity_floor"),
         *shared("ms_per_frame vertices_ms local_ms global_ms speedup"),
-        *shared("error_over_extent shape_error"),
-        *shared("velocity_error energy_drift"),
+        *shared("error_over_extent shape_error velocity_error energy_drift"),
         text(
             "motion",
             f"{TRAIN}, or how the motion differs from the training one: {', '.join(MOTIONS)}",
@@ -59,13 +56,10 @@ def reduced_reruns(
 ) -> pd.DataFrame:  # fmt: skip
     """Reduced runs of the training motion with their times, then runs of each held-out motion.
 
-    There is one row per motion, scene, group, method and r. Rows of runs in position subspaces
-    follow; all groups are reduced there, and r is the number of evaluated elements. The horizon of
-    a scene and motion is the first frame in which perturbed full-order runs differ from unperturbed
-    ones by more than a limit. Errors "within the horizon" use earlier frames only, and are empty if
-    a run blew up in these. Rows of method `PLAYBACK` compare the training with a held-out motion.
-    Errors are against the full-order run with the scene's iterations, and also against the
-    converged one.
+    Rows of runs in position subspaces follow those of reduced groups. The horizon of a scene and
+    motion is the first frame in which perturbed full-order runs differ from unperturbed ones by
+    more than a limit. Errors "within the horizon" use earlier frames only, and are empty if a run
+    blew up in these. Rows of method `PLAYBACK` compare the training with a held-out motion.
     """
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
@@ -88,7 +82,7 @@ def reduced_reruns(
             found = pd.concat([found, played], ignore_index=True)
         judged.append(found)
     judged[0] = _with_times(judged[0], results.timings_in_one_time(timings, frame_times))
-    made = pd.concat(judged, ignore_index=True).assign(reference=results.ITERATIONS)
+    made = pd.concat(judged, ignore_index=True).assign(reference=declaration.ITERATIONS)
     known = references[["scene", "motion", *results.OWN_ERRORS]]
     return made.merge(known, on=["scene", "motion"], how="left")
 
@@ -127,10 +121,7 @@ def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
 def _errors(
     runs: Sequence[h5py.Group], reference: Series, end: int, units: Mapping[str, Any]
 ) -> dict[str, list[float | None]]:
-    """Name of an error -> its values over frames before ``end``, one per run.
-
-    A value is None if the run ended earlier. ``units`` are those of the `Yardstick`.
-    """
+    """Name of an error -> its values over frames before ``end``, one per run; None if it ended."""
     known = {unit: float(units[unit]) for unit in ("extent_norm", "rest_norm")}
     found = [
         errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
@@ -172,8 +163,7 @@ FRAGILE = 0.005
         number("stiffness_ratio", "factor on the weights of the reduced groups", compared="exact"),
         *shared("finite blowup_frame max_extent energy_ratio gain group position_basis k"),
         text("experiment", "rerun (of the study) or sweep (a short run)"),
-        results.REFERENCE,
-        *shared("relative_error"),
+        *shared("reference relative_error"),
         text("outcome", f"one of: {', '.join(OUTCOMES)}", compared="error"),
     ),
     reads={
@@ -193,8 +183,7 @@ def stability(
 ) -> pd.DataFrame:  # fmt: skip
     """Outcomes of reduced runs ("rerun"), then of short runs with other h or stiffness ("sweep").
 
-    Method "full" with position basis "full" is the full-order run. The error of a "rerun" row is
-    taken over the frames in which perturbed runs still agree, that of a "sweep" row over all.
+    The error of a "rerun" row is taken before the horizon, that of a "sweep" row over all frames.
     """
     runs = pd.concat([reruns.assign(position_basis="full", k=np.nan), subspaces], ignore_index=True)
     errors = results.trained(reduced_reruns)[[*results.KEYS, results.ERROR]]
@@ -204,7 +193,7 @@ def stability(
     runs = pd.concat([_full_order_rows(full_order), runs], ignore_index=True)
     runs = runs.assign(h=runs.scene.map(time_steps), stiffness_ratio=1.0, experiment="rerun")
     rows = pd.concat([runs, sweeps.assign(experiment="sweep")], ignore_index=True)
-    return rows.assign(outcome=outcomes(rows, wrong, departure), reference=results.ITERATIONS)
+    return rows.assign(outcome=outcomes(rows, wrong, departure), reference=declaration.ITERATIONS)
 
 
 def outcomes(runs: pd.DataFrame, wrong: float, departure: float) -> list[str]:
@@ -255,5 +244,5 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
     reads={"rows": Rows(paths.HARD_CASES)},
 )
 def hard_cases(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the ``rows`` of all cases: reductions in scenes with extreme meshes, states, settings."""
+    """Return the ``rows`` of all cases: scenes with extreme meshes, states or settings."""
     return rows

@@ -6,7 +6,7 @@ import pandas as pd
 from pdrom.model.held_out import MOTIONS
 from study.artifact import paths
 from study.experiments.error_budget import FULL_ORDER, PARTS, SPAN
-from study.tables.kit import results
+from study.tables.kit import declaration, results
 from study.tables.kit.declaration import flag, integer, number, shared, table, text
 from study.tables.kit.results import Rows
 
@@ -26,7 +26,7 @@ MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIO
             "over the norm of the displacement, in all frames",
         ),
         number("affine", "the same, if the best affine motions are taken out", compared="error"),
-        results.REFERENCE,
+        *shared("reference"),
         number("replay_error", "position error if the training trajectory is replayed instead"),
         number("replay_deformation_error", "deformation error of the replay"),
         number("full_order_error", "position error of the run with the scene's iterations"),
@@ -38,7 +38,7 @@ MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIO
 )
 def test_trajectories(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per scene and held-out motion; errors are before the horizon, of converged runs."""
-    return rows[rows.motion != results.TRAIN].assign(reference=results.CONVERGED)
+    return rows[rows.motion != results.TRAIN].assign(reference=declaration.CONVERGED)
 
 
 @table(
@@ -56,7 +56,7 @@ def test_trajectories(rows: pd.DataFrame) -> pd.DataFrame:
             "elements; sampling: with the sampled ones; run: five local/global iterations; "
             "full_order: the full order with the scene's iterations",
         ),
-        results.REFERENCE,
+        *shared("reference"),
         number("error", "position error"),
         *shared("deformation_error"),
         number("added", "deformation error less that of the part before", compared="error"),
@@ -80,4 +80,4 @@ def error_budget(rows: pd.DataFrame, references: pd.DataFrame) -> pd.DataFrame:
     known = references[["scene", "motion", *results.OWN_ERRORS]]
     rows = rows.assign(added=added).merge(known, "left", ["scene", "motion"])
     least = rows.reference_deformation_error.fillna(rows.reference_error) / results.THIRD
-    return rows.assign(largest=most & (rows.added > least), reference=results.CONVERGED)
+    return rows.assign(largest=most & (rows.added > least), reference=declaration.CONVERGED)

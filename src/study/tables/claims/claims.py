@@ -1,12 +1,8 @@
-"""Tables about the preprint's claims, by the rules of config/claims.yaml.
-
-The tests of a claim are evaluated, and their results are combined to verdicts. Table claims has
-the verdicts, claims_tests the result of every test, claims_sensitivity the verdicts under changed
-rules, and replication the verdicts of table claims beside those on other scenes.
-"""
+"""Tables about the preprint's claims, by the rules of config/claims.yaml."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -70,40 +66,37 @@ def answer_of(test: TestRule, values: np.ndarray) -> str:
     return answers.pop() if len(answers) == 1 else MACHINE
 
 
-class Outcome:
-    """Result of ``test`` on the values that it selects from ``tables``.
+def outcome(test: TestRule, tables: Tables) -> dict[str, Any]:
+    """Evaluate ``test`` on ``tables``: return its cells of table claims_tests, and three texts.
 
-    passed, near : whether each of the ``values`` satisfies the comparison; whether it is a ratio of
-        times that is too close to the threshold to decide
-    verdict : one of `VERDICTS`, by `answer_of`
     measured : text with the range of the values
     sentence : text with the number of rows that satisfy the comparison
     condition : text with this number for each value of the test's column ``by``; empty unless the
         verdict is "depends" or "depends on the machine"
     """
-
-    def __init__(self, test: TestRule, tables: Tables) -> None:
-        rows = values_of(test, tables)
-        self.values = values = rows[VALUE].to_numpy(float)
-        self.passed, self.near = satisfied(test, values), close(test, values)
-        self.verdict, self.condition = answer_of(test, values), ""
-        if len(values) == 0:
-            why = "nothing to compare in this configuration"
-            where = {k: v for k, v in test.where.items() if k != "r"}
-            if test.metric == "rerun_error" and len(filtered(tables["reduced_reruns"], where)):
-                why = "no size can run, the numerical rank allows none"
-            self.measured, self.sentence = "no data", f"{test.what}: {why}"
-            return
-        good, total, near = int(self.passed.sum()), len(values), int(self.near.sum())
-        self.measured = spread = _range(values)
-        limit = f"{'at least' if test.compare == '>=' else 'at most'} {test.threshold:g}"
-        self.sentence = f"{test.what}: {good} of {total} {limit} (measured {spread})"
-        beside = f"{near} of {total} within a factor {test.factor:g} of it" if near else ""
-        self.sentence += f", {beside}" if beside else ""
-        if self.verdict in (DEPENDS, MACHINE):
-            self.condition = f"{test.what}, {limit}: {_broken_down(test, rows, self.passed)}"
-        if self.verdict == MACHINE:
-            self.condition += f" (measured {spread}; {beside}, which decides nothing)"
+    rows = values_of(test, tables)
+    values = rows[VALUE].to_numpy(float)
+    passed, near, total = satisfied(test, values), int(close(test, values).sum()), len(values)
+    good, verdict = int(passed.sum()), answer_of(test, values)
+    made: dict[str, Any] = {"least": None, "median": None, "most": None}
+    made |= {"satisfied": good, "of": total, "close": near, "verdict": verdict, "condition": ""}
+    if total == 0:
+        why = "nothing to compare in this configuration"
+        where = {k: v for k, v in test.where.items() if k != "r"}
+        if test.metric == "rerun_error" and len(filtered(tables[RERUNS], where)):
+            why = "no size can run, the numerical rank allows none"
+        return made | {"measured": "no data", "sentence": f"{test.what}: {why}"}
+    spread = _range(values)
+    limit = f"{'at least' if test.compare == '>=' else 'at most'} {test.threshold:g}"
+    beside = f"{near} of {total} within a factor {test.factor:g} of it" if near else ""
+    sentence = f"{test.what}: {good} of {total} {limit} (measured {spread})"
+    if verdict in (DEPENDS, MACHINE):
+        made["condition"] = f"{test.what}, {limit}: {_broken_down(test, rows, passed)}"
+    if verdict == MACHINE:
+        made["condition"] += f" (measured {spread}; {beside}, which decides nothing)"
+    ends = {"least": values.min(), "median": np.median(values), "most": values.max()}
+    sentence += f", {beside}" if beside else ""
+    return made | ends | {"measured": spread, "sentence": sentence}
 
 
 def _broken_down(test: TestRule, rows: pd.DataFrame, passed: np.ndarray) -> str:
@@ -137,12 +130,8 @@ def combined(verdicts: Sequence[str]) -> str:
 
     "cannot be decided", "does not hold", "depends on the machine", "depends", "holds"
     """
-    if not verdicts:
-        return UNTESTED
-    for verdict in (UNDECIDED, FAILS, MACHINE, DEPENDS):
-        if verdict in verdicts:
-            return verdict
-    return HOLDS
+    order = (UNDECIDED, FAILS, MACHINE, DEPENDS, HOLDS)
+    return next((verdict for verdict in order if verdict in verdicts), UNTESTED)
 
 
 def timed_columns(rule: ClaimRule) -> set[str]:
@@ -154,8 +143,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
             found.add(f"why{suffix}")
         if any(test.decides for test in timed):
             found |= {f"{name}{suffix}" for name in ("measured", "verdict", "condition")}
-            found.add(f"verdict{suffix}_both")
-            found.add("answer")
+            found |= {f"verdict{suffix}_both", "answer"}
     return found
 
 
@@ -179,12 +167,10 @@ def timed_parts(*cells: str) -> TimedCells:
     )
 
 
-# Fields of a claim's rule that are columns of the table claims.
-WORDS = {"source", "paper", "figure_or_table", "section", "shown", "text", "qualifiers"}
-SAID = {"what", "metric", "decides", "compare", "threshold", "share"}
-FOUND = ("satisfied", "of", "close", "least", "median", "most", "verdict")
 ONE_OF = f"one of: {', '.join(VERDICTS)}"
-# Constructs a column that may depend on times and is not compared with the expected table.
+CLAIM = text("claim", "its identifier in config/claims.yaml")
+# Construct columns that may depend on times: verdicts, and what is not compared with expected ones.
+judged = partial(text, timed=True, compared="exact")
 skipped = partial(Column, timed=True, compared="skipped")
 FACTORS = (0.5, 0.8, 1.25, 2.0)  # table claims_sensitivity multiplies thresholds by these
 SHARES = (0.5, 0.6, 0.75, 0.9, 1.0)
@@ -202,11 +188,11 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (one of `VARIED`, cha
 @declare(
     title="Verdicts on the claims of the preprint",
     columns=(
-        text("claim", "its identifier in config/claims.yaml"),
+        CLAIM,
         text("source", "who claims it"),
         text("paper", "what the preprint says"),
         skipped("text", "measured", "range of what was measured, of the tests that decide"),
-        timed(text("verdict", f"as published, {ONE_OF}", compared="exact")),
+        judged("verdict", f"as published, {ONE_OF}"),
         skipped("text", "why", "all tests in words"),
         text("figure_or_table", "where to see it"),
         text("section", "section of the preprint"),
@@ -215,15 +201,9 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (one of `VARIED`, cha
         text("qualifiers", "what a fair test has to keep"),
         skipped("text", "condition", "what the verdict depends on"),
         skipped("text", "measured_beyond", "the same of sound variants on well-posed scenes"),
-        timed(text("verdict_beyond", "the verdict there", compared="exact")),
-        timed(
-            text(
-                "verdict_both",
-                "as published, if the deformation error counts, too",
-                compared="exact",
-            )
-        ),
-        timed(text("verdict_beyond_both", "the same of sound variants", compared="exact")),
+        judged("verdict_beyond", "the verdict there"),
+        judged("verdict_both", "as published, if the deformation error counts, too"),
+        judged("verdict_beyond_both", "the same of sound variants"),
         skipped("text", "condition_beyond", "what it depends on"),
         skipped("text", "why_beyond", "all tests there in words"),
         skipped("text", "answer", "both verdicts in words"),
@@ -239,47 +219,39 @@ def claims(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
 
 
 def _row(name: str, rule: ClaimRule, tables: Tables) -> dict[str, Any]:
-    published, beyond = _decided(rule.published, tables), _decided(rule.beyond, tables)
-    both = with_both(tables)
-    verdicts = {
-        f"verdict{suffix}_both": _decided(getattr(rule, part), both)["verdict"]
-        for part, suffix in PARTS.items()
-    }
-    return {
-        "claim": name,
-        **rule.model_dump(include=WORDS),
-        **published,
-        **{f"{key}_beyond": value for key, value in beyond.items()},
-        **verdicts,
-        "answer": f"as published it {published['verdict']}, beyond it {beyond['verdict']}",
-        "history": " ".join(
-            f"{change.date.isoformat()}{' (results were known)' * change.after_data}: "
-            f"{change.reason}"
-            for change in rule.changes
-        ),
-    }
+    made, both = {"claim": name, **dict(rule)}, with_both(tables)
+    for part, suffix in PARTS.items():
+        tests = getattr(rule, part)
+        made |= {f"{key}{suffix}": text for key, text in _decided(tests, tables).items()}
+        made[f"verdict{suffix}_both"] = _decided(tests, both)["verdict"]
+    history = [
+        f"{change.date.isoformat()}{' (results were known)' * change.after_data}: {change.reason}"
+        for change in rule.changes
+    ]
+    answer = f"as published it {made['verdict']}, beyond it {made['verdict_beyond']}"
+    return made | {"answer": answer, "history": " ".join(history)}
 
 
 def _decided(tests: Sequence[TestRule], tables: Tables) -> dict[str, str]:
-    outcomes = [(test, Outcome(test, tables)) for test in tests]
-    deciding = [o for test, o in outcomes if test.decides]
+    outcomes = [outcome(test, tables) for test in tests]
+    deciding = [found for test, found in zip(tests, outcomes, strict=True) if test.decides]
     return {
-        "measured": "; ".join(o.measured for o in deciding),
-        "verdict": combined([o.verdict for o in deciding]),
-        "condition": "; ".join(o.condition for o in deciding if o.condition),
-        "why": "; ".join(o.sentence for _, o in outcomes) + ".",
+        "measured": "; ".join(found["measured"] for found in deciding),
+        "verdict": combined([found["verdict"] for found in deciding]),
+        "condition": "; ".join(filter(None, (found["condition"] for found in deciding))),
+        "why": "; ".join(found["sentence"] for found in outcomes) + ".",
     }
 
 
 def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
     timed = any(test.timed for test in getattr(rule, row.part) if test.what == row.what)
-    return {*FOUND} if timed else set()
+    return {*claims_tests.timing_columns} if timed else set()
 
 
 @table(
     title="Tests of the claims",
     columns=(
-        text("claim", "its identifier in config/claims.yaml"),
+        CLAIM,
         text("part", f"which verdict: {', '.join(PARTS)}"),
         text("what", "words for the rows that are compared"),
         text("metric", "what is compared"),
@@ -294,7 +266,7 @@ def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
         skipped("number", "least", "smallest value; infinite for a run that failed"),
         skipped("number", "median", "their median"),
         skipped("number", "most", "largest value"),
-        timed(text("verdict", f"of this test, {ONE_OF}", compared="exact")),
+        judged("verdict", f"of this test, {ONE_OF}"),
     ),
     reads=READS,
     timed_cells=by_rules(_timed_of_test),
@@ -302,7 +274,8 @@ def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
 def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
     """One row per claim, kind of verdict (`PARTS`) and test; ``added``: see table `claims`."""
     rows = [
-        {"claim": name, "part": part, **test.model_dump(include=SAID), **_found(test, tables)}
+        {"claim": name, "part": part, **dict(test), **outcome(test, tables)}
+        | {"margin": test.factor if test.timed else None}
         for name, rule in load_claims(rules, added).items()
         for part in PARTS
         for test in getattr(rule, part)
@@ -310,24 +283,15 @@ def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFr
     return pd.DataFrame(rows)
 
 
-def _found(test: TestRule, tables: Tables) -> dict[str, Any]:
-    """Cells of table claims_tests with the result of ``test``: margin, counts, range, verdict."""
-    own = Outcome(test, tables)
-    values, counts = own.values, (int(own.passed.sum()), len(own.values), int(own.near.sum()))
-    spread = (values.min(), np.median(values), values.max()) if len(values) else (None,) * 3
-    found = zip(FOUND, (*counts, *spread, own.verdict), strict=True)
-    return {"margin": test.factor if test.timed else None, **dict(found)}
-
-
 @table(
     title="Verdicts under other rules",
     columns=(
-        text("claim", "its identifier in config/claims.yaml"),
+        CLAIM,
         text("part", f"tests that decide: {', '.join(PARTS)}"),
         text("varied", f"what is changed in all of them: {', '.join(VARIED)}"),
         text("variation", "how: factor, share, sizes, split, scene left out"),
-        timed(text("verdict", ONE_OF, compared="exact", tolerance=FRAGILE)),
-        timed(text("verdict_of_rules", "the verdict of the rules as they are", compared="exact")),
+        judged("verdict", ONE_OF, tolerance=FRAGILE),
+        judged("verdict_of_rules", "the verdict of the rules as they are"),
         timed(flag("same", "the two agree", compared="exact", tolerance=FRAGILE)),
     ),
     reads=READS,
@@ -339,24 +303,21 @@ def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.
     A variation is omitted if a test has no rows; of sizes, splits, scenes, also if no row changes.
     """
     made = []
-    for claim, rule in load_claims(rules, added).items():
-        for part in PARTS:
-            tests = [test for test in getattr(rule, part) if test.decides]
-            if not tests:
-                continue
-            rows = [values_of(test, tables) for test in tests]
-            base = _verdict(tests, rows)
-            for varied, variation, changed, kept in _variations(tests, rows, tables):
-                if all(len(values) for values in (*rows, *kept)):
-                    verdict = _verdict(changed, kept)
-                    made.append((claim, part, varied, variation, verdict, base, verdict == base))
-    names = ["claim", "part", "varied", "variation", "verdict", "verdict_of_rules", "same"]
-    return pd.DataFrame(made, columns=names)
+    for (claim, rule), part in product(load_claims(rules, added).items(), PARTS):
+        tests = [test for test in getattr(rule, part) if test.decides]
+        rows = [values_of(test, tables) for test in tests]
+        base = _verdict(tests, rows)
+        for varied, variation, changed, kept in _variations(tests, rows, tables) if tests else ():
+            if all(len(values) for values in (*rows, *kept)):
+                verdict = _verdict(changed, kept)
+                made.append((claim, part, varied, variation, verdict, base, verdict == base))
+    return pd.DataFrame(made, columns=claims_sensitivity.column_names)
 
 
 def _verdict(tests: Sequence[TestRule], rows: _Rows) -> str:
-    values = [found[VALUE].to_numpy(float) for found in rows]
-    return combined(list(map(answer_of, tests, values)))
+    return combined(
+        [answer_of(t, r[VALUE].to_numpy(float)) for t, r in zip(tests, rows, strict=True)]
+    )
 
 
 def _with(test: TestRule, **changes: Any) -> TestRule:
@@ -410,13 +371,13 @@ def _kept(
     title="Verdicts on other scenes, by the same rules",
     columns=(
         text("replication", "its name in config/reference/replication/commits.csv"),
-        text("claim", "its identifier in config/claims.yaml"),
+        CLAIM,
         text("part", f"which verdict: {', '.join(PARTS)}"),
-        timed(text("verdict", f"of this study, {ONE_OF}", compared="exact")),
+        judged("verdict", f"of this study, {ONE_OF}"),
         text("verdict_replication", "the recorded verdict on the other scenes"),
         timed(flag("decidable", "neither is one of the last two", compared="exact")),
         timed(flag("same", "the two agree", compared="exact")),
-        timed(text("measured", "range of the tests that decide", compared="skipped")),
+        skipped("text", "measured", "range of the tests that decide"),
         text("measured_replication", "the same range there"),
         flag("rules_unchanged", "the rules are those by which the record was decided"),
         text("date", "day of the record"),
@@ -437,10 +398,9 @@ def replication(claims: pd.DataFrame, rules: Path, recorded: Path, commits: Path
     both = others.merge(claims, on="claim", suffixes=("_replication", ""))
     fingerprints = {claim: rule.fingerprint for claim, rule in load_claims(rules).items()}
     both["rules_unchanged"] = both.rules == both.claim.map(fingerprints)
-    kept = ["replication", "claim", "rules_unchanged", "date", "frozen", "recorded"]
     rows = []
     for part, suffix in PARTS.items():
-        own = both[kept].assign(part=part)
+        own = both.assign(part=part)
         for name in ("verdict", "measured"):
             own[name] = both[f"{name}{suffix}"]
             own[f"{name}_replication"] = both[f"{name}{suffix}_replication"]

@@ -1,5 +1,6 @@
 """Metrics of claims: functions that return a number for each selected row (or group of rows)."""
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -8,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from study.tables.accuracy_cost import CURVE
-from study.tables.kit.results import MEDIAN, families, trained, with_held_out
+from study.tables.kit.results import ERROR, EXPERIMENT, MEDIAN, TWIN, trained, with_held_out
 
 Tables = Mapping[str, pd.DataFrame]
 Value = str | int | float
@@ -20,8 +21,7 @@ LABELS = (
     "component", "implementation", "factor",
 )  # fmt: skip
 AXES = ("x", "y", "z")
-_ERROR = "relative_error_within_horizon"
-_RUN = ["scene", "group", "method"]
+_RUN = [*EXPERIMENT, "method"]
 
 
 def filtered(table: pd.DataFrame, where: Where) -> pd.DataFrame:
@@ -34,11 +34,9 @@ def filtered(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
     """Reduced runs of the training motion that ``where`` selects and that could be started.
 
-    A run cannot be started if its size r exceeds the numerical rank of the snapshots. Runs with
-    reduced positions are included only if ``where`` selects a position basis, because methods have
-    the same names with full and with reduced positions. ``r: [full]`` selects the largest size
-    tried for each scene, group and method, even if the run blew up in its first frame: a smaller
-    size that survived must not be mistaken for full rank.
+    Runs with reduced positions are included only if ``where`` selects a position basis, because
+    methods have the same names there. ``r: [full]`` selects the largest size tried for each scene,
+    group and method, even if that run blew up: no smaller size must be mistaken for full rank.
     """
     table = trained(table)
     table = table if "position_basis" in where else table[table.position_basis == "full"]
@@ -58,31 +56,23 @@ def by_axis(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 def held_out(
     choose: Callable[[pd.DataFrame, Where], pd.DataFrame], table: pd.DataFrame, where: Where
 ) -> pd.DataFrame:
-    """Rows of ``table`` selected by ``choose``; their error is the median over held-out motions.
-
-    Runs without an error on held-out motions are left out. Times are those of the training motion.
-    """
+    """Rows of ``table`` that ``choose`` selects, with the median of their held-out errors."""
     runs = with_held_out(trained(table), table)
-    return choose(runs[runs[MEDIAN].notna()].assign(**{_ERROR: runs[MEDIAN]}), where)
+    return choose(runs[runs[MEDIAN].notna()].assign(**{ERROR: runs[MEDIAN]}), where)
 
 
 def decay(rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Singular values / largest of the constraint group; groups of mere round-off are left out."""
-    rows = rows[rows.groupby(["scene", "group"]).above_roundoff.transform("any")]
-    return rows.relative
+    return rows.relative[rows.groupby(EXPERIMENT).above_roundoff.transform("any")]
 
 
 def reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Reconstruction error per row; inf if the interpolation is singular (``accuracy``: unused)."""
+    """Reconstruction error per row; inf if the interpolation is singular."""
     return rows[rows.gain.notna()].relative_error.fillna(np.inf)
 
 
 def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Reconstruction errors of the projections' x-, y- and z-coordinates, one in each row.
-
-    Rows of an axis whose projections are rounding errors only have no error and are left out. An
-    error is infinite if the matrix of the interpolation is singular.
-    """
+    """Reconstruction errors of each coordinate, but for axes whose projections are round-off."""
     rows = rows[rows.gain.notna()]
     curve = [rows[label] for label in (*_RUN, "split", "axis")]
     real = rows.relative_error.notna().groupby(curve).transform("any")
@@ -90,16 +80,14 @@ def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 
 
 def elements_per_entry(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Number of evaluated elements divided by r, the number of modes (``accuracy`` is unused)."""
-    rows = rows[rows.elements_sampled.notna()]
-    return rows.elements_sampled.astype(float) / rows.r
+    """Number of evaluated elements divided by r, the number of modes."""
+    return rows.elements_sampled.dropna().astype(float) / rows.r[rows.elements_sampled.notna()]
 
 
 def local_ratio(name: str, rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Time of a reduced local step, or a part of it, divided by that of the full compiled step.
+    """Column ``name`` (time of a reduced local step over that of the full one) at the largest r.
 
-    This is column ``name``, taken at the largest size r of each scene, group, method and mesh:
-    there the dense solve for the coefficients is the most expensive.
+    There the dense solve for the coefficients is the most expensive.
     """
     rows = rows.dropna(subset=[name]).sort_values("r")
     return rows.groupby(CURVE, sort=False).tail(1).sort_index()[name]
@@ -107,24 +95,23 @@ def local_ratio(name: str, rows: pd.DataFrame, accuracy: float) -> pd.Series:
 
 def useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.Series:
     """Speed-up over the full-order run; 0 for a run whose error exceeds ``accuracy``."""
-    return rows.speedup.where(rows[_ERROR] <= accuracy, 0.0).dropna()
+    return rows.speedup.where(rows[ERROR] <= accuracy, 0.0).dropna()
 
 
 def best_useful_speedup(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
     """Largest speed-up with an error up to ``accuracy`` (else 0) for each scene and group."""
-    useful = useful_speedup(rows, accuracy).rename(VALUE)
-    return useful.groupby([rows.scene, rows.group], sort=False).max().reset_index()
+    useful = rows.assign(**{VALUE: useful_speedup(rows, accuracy)}).dropna(subset=VALUE)
+    return useful.groupby(EXPERIMENT, sort=False, as_index=False)[VALUE].max()
 
 
 def error_trend(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Spearman's rank correlation of error and size r, for each scene, group and method.
+    """Spearman's rank correlation of error and size r (1: rises), for each scene, group and method.
 
-    It is 1 if the error rises with every size, -1 if it falls with every size. Runs that blew up
-    share the highest rank. Fewer than three sizes give no value; equal errors give 0.
+    Runs that blew up share the highest rank. Fewer than three sizes give no value.
     """
     trends = []
     for labels, run in rows.groupby(_RUN, sort=False):
-        error = run[_ERROR].fillna(np.inf)
+        error = run[ERROR].fillna(np.inf)
         if len(run) >= 3:
             trend = 0.0 if error.nunique() == 1 else error.rank().corr(run.r.rank())
             trends.append((*labels, trend))
@@ -132,28 +119,22 @@ def error_trend(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """P-value of Page's test (1963) that errors rise with the size r, over families of scenes.
+    """P-value of Page's test (1963) that the error in column ``name`` rises with the size r.
 
-    Errors are read from column ``name`` (for repeated runs, a median over repetitions). Treatments
-    of the test are the sizes of an experiment (scene, group, method) in ascending order; runs that
-    blew up share the highest rank. Experiments on a scene and on its variant ("twin") are
-    dependent: this family is one block, with mean ranks. Only experiments with the most common
-    number of sizes are used. The result has one row, or none if there are fewer than two blocks or
-    fewer than three sizes.
+    Treatments are the sizes of an experiment (scene, group, method); runs that blew up share the
+    highest rank. A scene and its variant ("twin") are one block, with mean ranks. Only experiments
+    with the most common number of sizes are used. No row for less than 2 blocks or 3 sizes.
     """
     # imported here, as the import takes a second and planning the workflow does not need SciPy
     from scipy.stats import page_trend_test, rankdata
 
-    runs = [run for _, run in rows.sort_values("r").groupby(_RUN, sort=False)]
-    lengths = [len(run) for run in runs]
-    common = max(set(lengths), key=lambda n: (lengths.count(n), n), default=0)
-    ranks: dict[str, list[np.ndarray]] = {}
-    for run in (run for run in runs if len(run) == common):
-        ranked = run[name].rank(na_option="bottom").to_numpy(float)
-        ranks.setdefault(families(run.scene).iloc[0], []).append(ranked)
-    if len(ranks) < 2 or common < 3:
+    ranks: dict[int, dict[str, list[pd.Series]]] = defaultdict(lambda: defaultdict(list))
+    for (scene, *_), run in rows.sort_values("r").groupby(_RUN, sort=False):
+        ranks[len(run)][scene.removesuffix(TWIN)].append(run[name].rank(na_option="bottom"))
+    common = max(ranks, key=lambda n: (sum(map(len, ranks[n].values())), n), default=0)
+    if len(ranks[common]) < 2 or common < 3:
         return pd.DataFrame(columns=[VALUE])
-    blocks = [rankdata(np.mean(own, axis=0)) for own in ranks.values()]
+    blocks = [rankdata(np.mean(own, axis=0)) for own in ranks[common].values()]
     return pd.DataFrame({VALUE: [float(page_trend_test(blocks, ranked=True).pvalue)]})
 
 
@@ -163,15 +144,12 @@ def noise_error(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 
 
 def position_basis_ratio(rows: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """Error with POD divided by error with skinning position basis, for each scene and size k.
-
-    Pairs in which both errors exceed ``accuracy`` are left out, as their ratio is meaningless.
-    """
+    """Error with POD over that with skinning, by scene and k, if one is at most ``accuracy``."""
     kinds = [rows[rows.position_basis == kind] for kind in ("pod", "skinning")]
-    pod, skinning = (rows.set_index(["scene", "k"])[_ERROR] for rows in kinds)
+    pod, skinning = (rows.set_index(["scene", "k"])[ERROR] for rows in kinds)
     both = pd.DataFrame({"pod": pod, "skinning": skinning}).dropna()
     both = both[both.min(axis=1) <= accuracy]
-    return both.assign(**{VALUE: both["pod"] / both["skinning"]})[[VALUE]].reset_index()
+    return both["pod"].div(both["skinning"]).rename(VALUE).reset_index()
 
 
 def over_the_rest(share: np.ndarray) -> np.ndarray:
@@ -188,8 +166,7 @@ class Metric:
         values of some of these rows, or a table with columns `VALUE`, scene, group ...
     choose : function of the table and ``where`` (column -> allowed values) that selects the rows
     labels : columns that ``where`` may name although the table lacks them: ``choose`` adds them
-    timed : whether values are computed from measured times
-    ratio : function that converts a value to a ratio of two times, for timed metrics
+    timed : whether values are computed from measured times; ``ratio`` makes a ratio of two of one
     """
 
     of: Values
@@ -216,11 +193,11 @@ METRICS = {
         lambda rows, _: rows.local_share, "local_share", timed=True, ratio=over_the_rest
     ),
     # error over frames in which perturbed full-order runs agree; inf if the run blew up in them
-    "rerun_error": Metric(lambda rows, _: rows[_ERROR].fillna(np.inf), _RERUNS, reruns),
+    "rerun_error": Metric(lambda rows, _: rows[ERROR].fillna(np.inf), _RERUNS, reruns),
     "useful_speedup": Metric(useful_speedup, _RERUNS, reruns, timed=True),
     "best_useful_speedup": Metric(best_useful_speedup, _RERUNS, reruns, timed=True),
     "error_trend": Metric(error_trend, _RERUNS, reruns),
-    "trend_p_value": Metric(partial(trend_p_value, _ERROR), _RERUNS, reruns),
+    "trend_p_value": Metric(partial(trend_p_value, ERROR), _RERUNS, reruns),
     "repeated_trend_p_value": Metric(partial(trend_p_value, "error_median"), "repetitions"),
     "singular_value_decay": Metric(decay, "singular_values"),
     "reconstruction_error": Metric(reconstruction, _RECONSTRUCTION),

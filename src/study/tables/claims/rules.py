@@ -19,7 +19,6 @@ from study.tables.claims.metrics import METRICS, Value
 SETS = "sets"
 _NAMED = "@"  # "@name" in ``where`` stands for all values of the set ``name``
 Added = Mapping[str, Sequence[Value]]
-NONE_ADDED: Added = MappingProxyType({})
 MARGIN = 1.5  # default of `TestRule.margin` for tests that compare times
 PARTS = {"published": "", "beyond": "_beyond"}  # field of `ClaimRule` -> suffix in table claims
 # Inputs of tables about claims: rules, scenes to add to sets in them, tables that metrics read.
@@ -34,13 +33,11 @@ class TestRule(ConfigModel):
     """Test of a claim: comparison of a metric with a threshold.
 
     what : description of the compared rows, quoted in the reason of the verdict
-    metric : name in `METRICS`
-    where : column -> allowed values
+    metric, where : name in `METRICS`; column -> allowed values
     accuracy : a run counts as accurate up to this error, in metrics that need accurate runs
     margin : a ratio of times that differs from the threshold by less than this factor counts
         neither for nor against the claim; None for the default, see `factor`
-    share : the test holds if at least this fraction of rows satisfies the comparison, does not hold
-        if at least this fraction violates it; else the verdict is "depends"
+    share : see `study.tables.claims.claims.answer`
     by : column by whose values rows are counted, to explain a verdict "depends"
     decides : whether the verdict on the claim uses this test
     """
@@ -78,11 +75,10 @@ class TestRule(ConfigModel):
             raise ValueError(f"metric = '{self.metric}': allowed are {', '.join(METRICS)}")
         metric = METRICS[self.metric]
         columns = (*declared()[metric.table].column_names, *metric.labels)
-        for column in self.where:
+        used = [*(("where", column) for column in self.where), *([("by", self.by)] * bool(self.by))]
+        for key, column in used:
             if column not in columns:
-                raise ValueError(f"where: no column '{column}'{choices(column, columns)}")
-        if self.by is not None and self.by not in columns:
-            raise ValueError(f"by: no column '{self.by}'{choices(self.by, columns)}")
+                raise ValueError(f"{key}: no column '{column}'{choices(column, columns)}")
         if self.margin is not None and not self.timed:
             raise ValueError(f"margin = {self.margin:g}: {self.metric} compares no times")
         return self
@@ -104,8 +100,7 @@ class Change(ConfigModel):
 class ClaimRule(ConfigModel):
     """Claim of the preprint, its section and figures there, and the tests that decide about it.
 
-    text : the claim in our words
-    paper : the statement of the preprint, in a few words
+    text, paper : the claim in our words, and the statement of the preprint in a few words
     section, shown : section and figures of the preprint
     qualifiers : conditions that a fair test has to respect
     published : tests on the preprint's variants of the method and on its scenes
@@ -126,13 +121,9 @@ class ClaimRule(ConfigModel):
     changes: Annotated[tuple[Change, ...], Field(min_length=1)]
 
     @model_validator(mode="after")
-    def _something_decides(self) -> Self:
+    def _sound(self) -> Self:
         if not any(test.decides for test in self.published):
             raise ValueError("published: none of them decides")
-        return self
-
-    @model_validator(mode="after")
-    def _changes_in_order(self) -> Self:
         dates = [change.date for change in self.changes]
         if dates != sorted(dates):
             raise ValueError("changes: dates must not go back")
@@ -141,17 +132,16 @@ class ClaimRule(ConfigModel):
     @property
     def fingerprint(self) -> str:
         """Hash of eight hexadecimal digits over the rules without their descriptive texts."""
-        tests = [*self.published, *self.beyond]
         plain = [
             test.model_dump(mode="json", exclude={"what", "margin"})
             | ({"margin": test.factor} if test.timed else {})
-            for test in tests
+            for test in (*self.published, *self.beyond)
         ]
         content = json.dumps([len(self.published), plain], sort_keys=True)
         return hashlib.blake2b(content.encode(), digest_size=4).hexdigest()
 
 
-def load_claims(path: Path, added: Added = NONE_ADDED) -> dict[str, ClaimRule]:
+def load_claims(path: Path, added: Added = MappingProxyType({})) -> dict[str, ClaimRule]:
     """Read identifier -> claim from file ``path``; replace ``@name`` by the values of set ``name``.
 
     ``added`` maps names of sets in the file to values to append, such as scenes of this study only.

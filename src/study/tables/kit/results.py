@@ -3,8 +3,6 @@
 A job that times reduced runs of a scene, or runs without an effect, also times its full-order run,
 because machine speed differs between jobs. All times of a job are multiplied by one factor: time of
 the full-order run in table frame_times / its time in the job. Ratios of a job's times stay equal.
-
-Errors over held-out motions are summarised by their median, as fixed in config/claims.yaml.
 """
 
 from collections.abc import Collection, Iterable, Sequence
@@ -18,7 +16,7 @@ from pdrom.core.store import read_table
 from pdrom.reduction.timing import PHASES
 from study.artifact.paths import File
 from study.artifact.reads import Every
-from study.tables.kit.declaration import Column, integer, number, text
+from study.tables.kit.declaration import CONVERGED, Column, integer, number, text
 
 RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # columns that identify a run
@@ -43,9 +41,6 @@ MEASURES = POSITION, BOTH = "position", "both"
 MEASURE = text(
     "measure", "errors that have to be within a limit: position, or both (deformation, too)"
 )
-# What the column `reference` names: full-order runs with the scene's iterations, converged ones.
-ITERATIONS, CONVERGED = "iterations", "converged"
-REFERENCE = text("reference", f"run that errors refer to: {ITERATIONS} of the scene or {CONVERGED}")
 OWN_ERRORS = "reference_error", "reference_deformation_error"
 THIRD = 1.0 / 3.0  # largest error of a reference over a limit by which runs are judged
 ORTHOGONAL = "pod"  # method that evaluates all elements and projects onto the basis orthogonally
@@ -181,9 +176,8 @@ def judged_by(rows: pd.DataFrame, measure: str, limit: float) -> pd.DataFrame:
 def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFrame:
     """Median, least and largest error of each run over its held-out motions, and their number.
 
-    Errors use frames before the horizon, in which perturbed runs agree; a run that ended in these
-    has an infinite error. Left out are sizes above the numerical rank, which cannot run, motions
-    with horizon 0, and those for which playback of the training recording has an error <= `FAR`.
+    A run that ended before the horizon has an infinite error. Left out are sizes above the rank,
+    which cannot run, motions with horizon 0, and those that playback meets up to `FAR`.
     """
     ran = (reruns.frames > 0) | reruns.blowup_frame.notna()
     tests = (reruns.horizon_frame > 0) & (reruns.playback_error > FAR)
@@ -205,14 +199,9 @@ def with_held_out(runs: pd.DataFrame, reruns: pd.DataFrame) -> pd.DataFrame:
 def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
     """Training-motion runs of sampled methods with unreduced positions and a sufficient basis.
 
-    A basis suffices if the run with orthogonal projection has an error of at most `FAILED`. The
-    result has the columns of ``reruns`` and
-
-    gain : amplification of errors by the samples of the reduction
-    error : error over frames in which perturbed runs agree; inf if the run blew up in one of them
-    orthogonal_error : error of the run with orthogonal projection at the largest basis size up to
-        the row's r; its centred basis may have one mode less than an uncentred one
-    failed : whether the error exceeds `FAILED`
+    A basis suffices if the run with orthogonal projection at the largest size up to r (a centred
+    basis may have one mode less) has an error of at most `FAILED`. The result has the columns of
+    ``reruns``, gain, error (before the horizon; inf if the run blew up) and failed.
     """
     runs = trained(reruns)
     runs = runs[(runs.position_basis == "full") & runs.max_extent.notna()]

@@ -165,7 +165,7 @@ def write_study(folder: Path) -> dict[str, object]:
 def test_a_cell_of_another_type_is_named_before_the_manuscript_is_made(tmp_path, monkeypatch):
     infinite = TABLES["claims_tests"].assign(satisfied=float("inf"))
     monkeypatch.setitem(TABLES, "claims_tests", infinite)
-    with pytest.raises(StorageError, match=r"'satisfied' is no integer \(row 1: 'inf'\)"):
+    with pytest.raises(StorageError, match=r"'satisfied'.*row 1: 'inf'"):
         write_study(tmp_path)
 
 
@@ -390,8 +390,7 @@ def test_references_have_the_numbers_of_the_pdf(small, tmp_path):
 
 
 def test_a_reference_to_nothing_is_named(tmp_path):
-    given = write_study(tmp_path)
-    path = tmp_path / "paper" / "main.tex"
+    given, path = write_study(tmp_path), tmp_path / "paper" / "main.tex"
     write_text(path.read_text("utf-8").replace(r"\ref{thm:s}", r"\ref{thm:lost}"), path)
     with pytest.raises(PaperError, match="no label thm:lost"):
         write_pages(given, tmp_path)
@@ -399,17 +398,10 @@ def test_a_reference_to_nothing_is_named(tmp_path):
 
 
 def test_what_the_study_does_not_hold_is_left_out(small):
-    text, supplement, claims = (
-        (small / f"{page}.html").read_text("utf-8") for page in ("index", "supplement", "claims")
-    )
-    for words in ("Shown, ", "<strong>Opening.</strong> Words.", "Full.", "One? Two"):
-        assert words in text
-    for words in ("Left out", "Not there", "lacking"):
-        assert words not in text
-    assert "<strong>Theorem S1</strong>" in supplement
-    rule = "(implementation: numpy, compiled)"
-    for words in ("A &lt;b&gt; claim.", "First version of it.", rule):
-        assert words in claims
+    text, claims = ((small / f"{page}.html").read_text("utf-8") for page in ("index", "claims"))
+    shown = {words: words in text for words in ("Shown, ", "Full.", "Left out", "lacking")}
+    assert shown == {"Shown, ": True, "Full.": True, "Left out": False, "lacking": False}
+    assert "(implementation: numpy, compiled)" in claims
 
 
 def test_the_same_bytes_again(small, tmp_path):
@@ -433,7 +425,7 @@ def test_pages_open_without_a_message_and_axe_finds_no_error(small, width, schem
 
 
 @pytest.mark.slow
-def test_a_link_opens_its_rows(small):
+def test_the_page_of_a_table_shows_the_rows_of_a_link_and_the_last_verification(small, tmp_path):
     for pages in study_or_small(small):
         inputs = pages.parent / ("inputs" if pages == small else "paper")
         numbers = json.loads((inputs / "numbers.json").read_text(encoding="utf-8"))["numbers"]
@@ -447,29 +439,20 @@ def test_a_link_opens_its_rows(small):
                 for key, found in zip(keys, rows, strict=True):
                     assert set(numbers[key]["rows"]) <= set(found), key
                     assert numbers[key]["take"] or len(found) <= 1, key
-
-
-@pytest.mark.slow
-def test_the_outcome_of_a_verification_is_shown(small, tmp_path):
-    write_verified({"table payoff": "differs, row 2", "claim C1": "reproduced"}, small)
-    with page_at(
-        (small / "tables" / "payoff.html").as_uri() + "#method=deim|error_train", 900, 700
-    ) as page:
+    write_verified({"table payoff": "differs, row 2"}, small)
+    address = (small / "tables" / "payoff.html").as_uri() + "#method=deim|error_train"
+    with page_at(address, 900, 700) as page:
         page.wait_for_selector("#rows td.asked")
         assert page.inner_text("[data-verified]") == "differs, row 2"
         assert page.inner_text("#rows td.asked") == "0.2512"
-        assert "tolerance" in page.inner_text("#column")
         page.get_by_role("button", name="All rows").click()
-        page.get_by_role("button", name="scenes").click()
-        page.get_by_role("button", name="scenes").click()
+        page.get_by_role("button", name="scenes").click(click_count=2)
         assert page.locator("#rows tbody tr").first.inner_text().startswith("2\tdeim")
-        assert page.evaluate("document.activeElement.textContent") == "scenes"
         page.evaluate("location.hash = '#error_train%'")
         page.wait_for_function("document.getElementById('every').hidden === false")
         assert page.locator("#rows tbody tr").count() == 2
-        for name in ('a"]', "\\", "]"):
-            page.evaluate("name => { location.hash = encodeURIComponent(name); }", name)
-            page.locator("#column", has_text=f"This table has no column {name}.").wait_for()
+        page.evaluate("location.hash = encodeURIComponent('a\"]')")
+        page.locator("#column", has_text='no column a"].').wait_for()
         assert page.said == []
     cut, whole = tmp_path / "tables" / "cut.html", (small / "tables" / "payoff.html").read_bytes()
     cut.parent.mkdir()

@@ -1,7 +1,6 @@
 """The page on which models run: one file, scenes beside it, and it works in a real browser."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +11,7 @@ from browser import page_at, picture
 from builders import make_scene
 from pdrom.core.errors import StorageError
 from pdrom.core.store import write_text
-from pdrom.view.page import filled
 from written_models import write_models, write_page
-
-
-def test_what_is_filled_in_is_not_looked_at():
-    assert filled("a{{X}}b{{Y}}", {"X": "{{Y}}", "Y": "}}"}) == "a{{Y}}b}}"
 
 
 def test_scenes_with_models_are_named_in_order_and_a_damaged_file_is_refused(tmp_path):
@@ -43,10 +37,7 @@ def write_sheet(folder: Path) -> Path:
 
 @pytest.mark.slow
 def test_of_scenes_chosen_in_haste_the_last_is_shown_and_a_lost_one_is_named(tmp_path):
-    """Files may come in any order; the page goes on after one that is missing.
-
-    Stands before the tests that share a browser: there can be one at a time.
-    """
+    """Files may come in any order; the page goes on after one that is missing."""
     one = write_sheet(tmp_path)
     files = [one.with_name(f"{name}.js") for name in "abcd"]
     for file in files:
@@ -85,70 +76,6 @@ def test_of_scenes_chosen_in_haste_the_last_is_shown_and_a_lost_one_is_named(tmp
         assert [said for said in page.said if not any(e in said for e in expected)] == []
 
 
-@pytest.fixture(scope="module", params=["", "#plain"], ids=["WebGL2", "canvas"])
-def opened(request, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    """The page of a sheet in a headless browser; what it said and asked for is noted."""
-    folder = tmp_path_factory.mktemp("page")
-    path = write_page(folder, [write_sheet(folder)])
-    with page_at(path.as_uri() + request.param, width=900, height=800) as page:
-        page.wait_for_selector('body[data-ready="yes"]')
-        yield page
-
-
-def after(page: Page, frame: int) -> None:
-    page.wait_for_function(f"Number(document.body.dataset.frame) >= {frame}")
-
-
-@pytest.mark.slow
-def test_it_runs_and_is_drawn(opened: Page) -> None:
-    after(opened, 2)
-    seen = picture(opened.locator("#picture"))
-    assert np.mean(seen.min(axis=2) < 200) > 0.005
-    after(opened, 25)
-    assert np.mean(np.abs(picture(opened.locator("#picture")) - seen).max(axis=2) > 30) > 1e-3
-    assert opened.inner_text("#verdict") == ""
-    after(opened, 125)
-    told = "document.getElementById('distance').textContent.includes('{}')"
-    opened.wait_for_function(told.format("ended"))
-    opened.click("#again")
-    opened.wait_for_function(told.format("%"))
-
-
-@pytest.mark.slow
-def test_a_handle_is_moved_by_a_key_held_and_let_go(opened: Page) -> None:
-    opened.click("#again")
-    opened.wait_for_function("Number(document.body.dataset.frame) < 60")
-    opened.focus("#handles button")
-    opened.keyboard.press("ArrowUp")
-    opened.wait_for_function(
-        "document.getElementById('distance').textContent === 'your motion was not recorded'"
-    )
-    opened.get_by_role("button", name="Let go of left").click()
-    opened.get_by_role("button", name="Hold left").wait_for()
-
-
-@pytest.mark.slow
-def test_a_pointer_takes_a_handle_and_turns_the_picture_elsewhere(opened: Page) -> None:
-    opened.click("#again")
-    opened.click("#play")
-    picture_box = opened.locator("#picture").bounding_box()
-    # no handle lies in the corner
-    opened.mouse.move(picture_box["x"] + 10, picture_box["y"] + picture_box["height"] - 10)
-    before = picture(opened.locator("#picture"))
-    opened.mouse.down()
-    opened.mouse.move(picture_box["x"] + 200, picture_box["y"] + picture_box["height"] - 40)
-    opened.mouse.up()
-    assert np.mean(np.abs(picture(opened.locator("#picture")) - before).max(axis=2) > 30) > 1e-3
-    assert opened.inner_text("#play") == "Play"
-    assert opened.inner_text("#distance") != "your motion was not recorded"
-
-
-@pytest.mark.slow
-def test_nothing_is_asked_of_a_network_and_nothing_is_said(opened: Page) -> None:
-    assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
-    assert opened.said == []
-
-
 LIFTED = """
 (size) => {
   const [canvas, other] = [1, 2].map(() => document.createElement("canvas"));
@@ -172,6 +99,51 @@ LIFTED = """
 
 
 @pytest.mark.slow
-def test_more_coordinates_than_a_card_takes_are_drawn_too(opened: Page) -> None:
+@pytest.mark.parametrize("drawn", ["", "#plain"], ids=["WebGL2", "canvas"])
+def test_a_model_runs_is_drawn_and_is_moved(drawn, tmp_path):
+    path = write_page(tmp_path, [write_sheet(tmp_path)])
+    with page_at(path.as_uri() + drawn, width=900, height=800) as page:
+        page.wait_for_selector('body[data-ready="yes"]')
+        use(page)
+
+
+def use(opened: Page) -> None:
+    """Watch a model to its end, move a handle by a key, and turn the picture by a pointer."""
+
+    def after(frame: int) -> None:
+        opened.wait_for_function(f"Number(document.body.dataset.frame) >= {frame}")
+
+    after(2)
+    seen = picture(canvas := opened.locator("#picture"))
+    assert np.mean(seen.min(axis=2) < 200) > 0.005
+    after(25)
+    assert np.mean(np.abs(picture(canvas) - seen).max(axis=2) > 30) > 1e-3
+    assert opened.inner_text("#verdict") == ""
+    after(125)
+    told = "document.getElementById('distance').textContent.includes('{}')"
+    opened.wait_for_function(told.format("ended"))
+    opened.click("#again")
+    opened.wait_for_function(told.format("%"))
+    # a handle is moved by a key, held and let go
+    opened.focus("#handles button")
+    opened.keyboard.press("ArrowUp")
+    opened.wait_for_function(
+        "document.getElementById('distance').textContent === 'your motion was not recorded'"
+    )
+    opened.get_by_role("button", name="Let go of left").click()
+    opened.get_by_role("button", name="Hold left").wait_for()
+    # a pointer turns the picture where no handle lies, such as in the corner
+    opened.click("#again")
+    opened.click("#play")
+    box, before = canvas.bounding_box(), picture(canvas)
+    opened.mouse.move(box["x"] + 10, box["y"] + box["height"] - 10)
+    opened.mouse.down()
+    opened.mouse.move(box["x"] + 200, box["y"] + box["height"] - 40)
+    opened.mouse.up()
+    assert np.mean(np.abs(picture(canvas) - before).max(axis=2) > 30) > 1e-3
+    assert opened.inner_text("#distance") != "your motion was not recorded"
+    # more coordinates than a card takes are drawn, too
     few, many = (opened.evaluate(LIFTED, size) for size in (12, 204))
     assert few == many > 100
+    assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert opened.said == []

@@ -37,7 +37,7 @@ RUNS = frame(
 CASES = {"heldout": 1.0, "kick": 1.0, "stiffness": 0.5, "validation_1": 1.0, "validation_2": 3.0}
 
 
-def made(folder, *recorded, runs=RUNS, cases=CASES, **changes) -> tuple[pd.DataFrame, list[File]]:
+def made(folder, *recorded, runs=RUNS, cases=CASES, **changes) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Table alternatives of the runs in each case, whose errors are multiplied, and its times.
 
     The second process is twice as slow; reduced models have these times in the first trajectory and
@@ -57,11 +57,11 @@ def made(folder, *recorded, runs=RUNS, cases=CASES, **changes) -> tuple[pd.DataF
     timed = rows[rows.ms_per_frame.notna() & rows.motion.isin(MOTIONS)]
     slower = (timed.motion != "heldout") & timed.method.str.startswith("ecsw")
     ms = timed.ms_per_frame.where(~slower, 2 * timed.ms_per_frame)
-    times = [timed.assign(process=p, ms_per_frame=p * ms) for p in (1, 2)]
-    files = [File(str(folder / name), {}) for name in ("parts.csv", "times.csv")]
-    write_table(rows.drop(columns=["ms_per_frame", "vertices_ms"]), files[0].path)
-    write_table(pd.concat(times)[[*KEYS, "process", "ms_per_frame", "vertices_ms"]], files[1].path)
-    return alternatives(files[:1], files[1:], [*recorded]), files[1:]
+    times = pd.concat(timed.assign(process=p, ms_per_frame=p * ms) for p in (1, 2))
+    times = times[[*KEYS, "process", "ms_per_frame", "vertices_ms"]]
+    parts = File(str(folder / "parts.csv"), {})
+    write_table(rows.drop(columns=["ms_per_frame", "vertices_ms"]), parts.path)
+    return alternatives([parts], times, [*recorded]), times
 
 
 def test_the_opponent_is_the_fastest_that_is_as_accurate(tmp_path):

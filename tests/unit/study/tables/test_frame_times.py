@@ -8,8 +8,6 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from builders import frame
-from pdrom.core.store import write_table
-from study.artifact.paths import File
 from study.experiments.frame_times import COLUMNS
 from study.tables.effects_cost import frame_times, online, scaling, speedups, unreliable
 from study.tables.errors import repetitions
@@ -41,7 +39,7 @@ def test_words_show_the_median_and_its_interval():
 
 
 @pytest.fixture
-def measured(tmp_path) -> list[File]:
+def measured() -> pd.DataFrame:
     """Three processes: scene a with its twin and two reductions; the machine's speed varies."""
     full, control = (("full", *5 * [None]), ("control", *5 * [None]))
     runs = frame(
@@ -57,9 +55,7 @@ def measured(tmp_path) -> list[File]:
         runs.assign(process=process, **speed * runs[times])
         for process, speed in ((1, 1.0), (2, 2.0), (3, 1.5))
     ]
-    path = tmp_path / "times.csv"
-    write_table(pd.concat(processes)[COLUMNS], path)
-    return [File(str(path), {})]
+    return pd.concat(processes)[COLUMNS]
 
 
 def test_each_scene_has_one_time_and_its_control(measured):
@@ -73,11 +69,11 @@ def test_each_scene_has_one_time_and_its_control(measured):
     assert np.isnan(table.twin_ratio["a_twin"])
 
 
-def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
+def test_a_speedup_stands_beside_its_costs_and_errors(measured):
     models = {"scene": ["a"], "position_basis": ["pod"], "k": [4], "method": ["ecsw"]}
-    write_table(pd.DataFrame({**models, "reduction_s": [0.15]}), tmp_path / "subspaces.csv")
     steps = {"scene": ["a"], "group": ["spring"], "method": ["deim"], "r": [6]}
-    write_table(pd.DataFrame({**steps, "reduction_s": [0.1]}), tmp_path / "projections.csv")
+    files = {"projections": pd.DataFrame({**steps, "reduction_s": [0.1]}), "reruns": None}
+    files |= {"subspaces": pd.DataFrame({**models, "reduction_s": [0.15]}), "large": pd.DataFrame()}
     runs = pd.concat([
         pd.DataFrame(models).assign(group="all", r=7, error_converged=0.01),
         pd.DataFrame(steps).assign(position_basis="full", error_converged=0.2),
@@ -86,12 +82,10 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
     runs = pd.concat([runs.assign(motion="train"), unseen])
     runs = runs.assign(deformation_converged=3.0 * runs.error_converged)
     runs = runs.assign(frames=9, blowup_frame=None, horizon_frame=9, playback_error=0.5)
-    files = {n: [File(str(tmp_path / f"{n}.csv"), {})] for n in ("projections", "subspaces")}
-    files |= {"parts": measured, "large": []}
-    times = frame_times(measured)
+    files["reruns"], times = runs, frame_times(measured)
     for uncertain in (times.assign(control_high=1.6), times.assign(control_low=0.6)):
-        assert set(speedups(uncertain, runs, **files).shown) == {"not confirmed by its control"}
-    table = speedups(times, runs, **files).set_index("method")
+        assert set(speedups(measured, uncertain, **files).shown) == {"not confirmed by its control"}
+    table = speedups(measured, times, **files).set_index("method")
     assert table.speedup.to_dict() == {"ecsw": pytest.approx(4.0), "deim": pytest.approx(0.5)}
     assert table.shown.to_dict() == {"ecsw": "4.0 (4.0 to 4.0)", "deim": "0.50 (0.50 to 0.50)"}
     assert table.vertices_ms.to_dict() == {"ecsw": pytest.approx(0.075), "deim": pytest.approx(0.6)}
@@ -108,20 +102,17 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured, tmp_path):
     assert pd.isna(table.error_heldout["deim"])
 
 
-def test_without_files_tables_are_empty():
-    times = frame_times([])
-    quoted = speedups(times, pd.DataFrame(), parts=[])
-    for empty in (times, quoted, online([], [], times), repetitions([]), scaling([])):
-        assert len(empty) == 0
+@pytest.mark.parametrize("made", [frame_times, speedups, online, repetitions, scaling])
+def test_without_files_tables_are_empty(made):
+    assert made(**dict.fromkeys(made.reads, pd.DataFrame())).empty
 
 
-def test_repetitions_are_told_by_median_and_range(tmp_path):
+def test_repetitions_are_told_by_median_and_range():
     errors, gains = [0.2, 0.1, float("inf")], [4.0, 3.0, 5.0]
     rows = pd.DataFrame({"seed": [1, 2, 3], "error": errors, "gain": gains}).assign(
         scene="a", group="spring", method="deim", r=6, varied="training", finite=True
     )
-    write_table(rows, tmp_path / "a.csv")
-    (row,) = repetitions([File(str(tmp_path / "a.csv"), {})]).itertuples()
+    (row,) = repetitions(rows).itertuples()
     assert (row.repetitions, row.ended) == (3, 1)
     assert (row.error_low, row.error_median, row.error_high) == (0.1, 0.2, np.inf)
     assert (row.gain_low, row.gain_median, row.gain_high) == (3.0, 4.0, 5.0)

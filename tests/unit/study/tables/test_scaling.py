@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pdrom.core.store import write_table
 from pdrom.reduction.method import MethodSpec
 from places import ROOT
 from study.artifact.paths import File
@@ -13,6 +12,7 @@ from study.experiments.timing import scaling as experiment
 from study.pipeline.scenes import read_scene
 from study.tables.accuracy_cost import CURVE, breakeven
 from study.tables.effects_cost import scaling
+from study.tables.kit.results import joined
 
 SPEC = MethodSpec(title="block DEIM", centring="affine", rows="element")
 JOINT = MethodSpec(title="joint DEIM", centring="affine", rows="joint")
@@ -20,11 +20,10 @@ JOINT = MethodSpec(title="joint DEIM", centring="affine", rows="joint")
 
 @pytest.mark.parametrize("sizes", [(100,), (100, 1000), (100, 1000, 10000)])
 @pytest.mark.parametrize("exponent", [0.0, 1.5])
-def test_a_power_law_has_its_exponent_if_there_are_three_sizes(tmp_path, sizes, exponent):
+def test_a_power_law_has_its_exponent_if_there_are_three_sizes(sizes, exponent):
     law = 0.25 * np.power(sizes, exponent)
     rows = pd.DataFrame({"method": "fom", "vertices": sizes, "ms_per_iteration": law})
-    write_table(rows.assign(scene="a").reindex(columns=ITERATIONS), tmp_path / "rows.csv")
-    row = scaling([File(str(tmp_path / "rows.csv"), {})]).iloc[0]
+    row = scaling(rows.assign(scene="a").reindex(columns=ITERATIONS)).iloc[0]
     expected = exponent if len(sizes) == 3 else np.nan
     assert row.exponent == pytest.approx(expected, abs=1e-12, nan_ok=True)
     assert row.meshes == len(sizes)
@@ -46,7 +45,7 @@ def test_every_size_is_measured(tmp_path, name):
         experiment(sources=[], settings=settings, **files)
         outputs[factor] = paths
     sizes = [scene.mesh.coarsened(f).build(ROOT).vertices for f in outputs]
-    table = scaling([File(made["iterations"], {}) for made in outputs.values()])
+    table = scaling(joined(File(made["iterations"], {}) for made in outputs.values()))
     assert table.method.tolist() == 2 * ["fom", "block-deim", "ecsw"]
     assert table.vertices.tolist() == [n for n in sizes for _ in range(3)]
     assert (table.ms_per_iteration >= table.local_ms + table.global_ms).all()

@@ -20,12 +20,6 @@ from study.tables.kit.results import TRAIN, trained
 from study.tables.reduced_reruns import reduced_reruns
 
 
-def written(path, *rows) -> File:
-    """CSV of rows given as mappings; missing cells stay empty."""
-    write_table(pd.DataFrame(list(rows)), path)
-    return File(str(path), {})
-
-
 def basis_file(path, sigma, rank) -> File:
     axes = (True,) * 3
     basis = Basis(np.zeros((6, rank)), np.zeros(6), np.array(sigma), rank, 1e-9, 1, axes)
@@ -60,12 +54,10 @@ SERIES = {
 }  # fmt: skip
 
 
-def beside(runs: list[str], end: str) -> list[str]:
-    return [run.removesuffix(".h5") + end for run in runs]
-
-
-def each(place: paths.Place, found: list[str]) -> list[File]:
-    return [place.file(path) for path in found]
+def write_both(path, rows: list[dict]) -> None:
+    """Write the rows of runs of the training motion, and the same of a held-out one."""
+    write_table(pd.DataFrame(rows), f"{path}.csv")
+    write_table(pd.DataFrame(rows).assign(motion="heldout"), f"{path}_heldout.csv")
 
 
 def store_series(run, difference):
@@ -112,9 +104,8 @@ def files(tmp_path) -> dict[str, object]:
                     "relative_error": 0.5 if whole else None,
                 }  # fmt: skip
             rows.append(row)
-        for name, more in {"deim.csv": {}, "deim_heldout.csv": {"motion": "heldout"}}.items():
-            written(folder / name, *({**row, **more} for row in rows))
-        reruns.append(str(folder / "deim.h5"))
+        write_both(folder / "deim", rows)
+        reruns.append(str(folder / "deim"))
     folder = tmp_path / "subspaces" / "b"
     folder.mkdir(parents=True)
     models = {("pod", 8, "full"): [0.4] * 4, ("pod", 8, "ecsw-1e-02"): [0.8] * 4}
@@ -132,9 +123,8 @@ def files(tmp_path) -> dict[str, object]:
          "relative_error": 0.1}
         for p, k, m in models
     ]  # fmt: skip
-    for name, more in {"models.csv": {}, "models_heldout.csv": {"motion": "heldout"}}.items():
-        written(folder / name, *({**row, **more} for row in rows))
-    subspaces = [str(folder / "models.h5")]
+    write_both(folder / "models", rows)
+    subspaces = [str(folder / "models")]
 
     def time(scene, implementation="compiled", ms=8.0, **labels):
         return {
@@ -144,22 +134,18 @@ def files(tmp_path) -> dict[str, object]:
         }  # fmt: skip
 
     local = {"group": "spring", "method": "deim"}
-    timings = [
-        written(
-            tmp_path / "timing_a.csv", time("a"), time("a", "numpy", 80.0),
-            time("a", "interpreted", 900.0), time("a", ms=4.0, r=6, **local),
-            time("a", ms=5.0, r=10, **local), time("a", ms=2.5, method="fom", iterations=2),
-            time("a", ms=24.0, method="fom", iterations=40),
-            time("a", ms=9.0, method="fom-anderson", iterations=10),
-            time("a", ms=2.0, method="coarser-mesh", iterations=10, vertices=4),
-            time("a", ms=3.0, method="coarser-mesh-anderson", iterations=10, vertices=4),
-        ),
-        written(
-            tmp_path / "timing_b.csv", time("b", ms=10.0), time("b", ms=2.0, r=6, **local),
-            time("b", ms=1.0, group="all", method="full", position_basis="pod", k=8),
-            time("b", ms=0.5, group="all", method="ecsw-1e-02", position_basis="pod", k=8),
-        ),
-    ]  # fmt: skip
+    timings = pd.DataFrame([
+        time("a"), time("a", "numpy", 80.0),
+        time("a", "interpreted", 900.0), time("a", ms=4.0, r=6, **local),
+        time("a", ms=5.0, r=10, **local), time("a", ms=2.5, method="fom", iterations=2),
+        time("a", ms=24.0, method="fom", iterations=40),
+        time("a", ms=9.0, method="fom-anderson", iterations=10),
+        time("a", ms=2.0, method="coarser-mesh", iterations=10, vertices=4),
+        time("a", ms=3.0, method="coarser-mesh-anderson", iterations=10, vertices=4),
+        time("b", ms=10.0), time("b", ms=2.0, r=6, **local),
+        time("b", ms=1.0, group="all", method="full", position_basis="pod", k=8),
+        time("b", ms=0.5, group="all", method="ecsw-1e-02", position_basis="pod", k=8),
+    ])  # fmt: skip
     references = [
         {"scene": scene, "motion": motion, "frames": 4, "horizon_frame": 4, "playback_all": 0.5,
          "playback_error": 0.5 if motion == "heldout" else None, "playback_deformation_error": 0.4,
@@ -167,19 +153,19 @@ def files(tmp_path) -> dict[str, object]:
          "reference_error": 0.01 if scene == "a" else 0.02, "reference_deformation_error": 0.03}
         for scene, motion in product("ab", (TRAIN, *MOTIONS))
     ]  # fmt: skip
-    path = tmp_path / "sensitivity.csv"
-    write_table(perturbed_runs(), path)
+    places = {
+        "runs": (paths.RERUNS, reruns, ".h5"), "rows": (paths.RERUNS_TRAIN, reruns, ".csv"),
+        "rows_heldout": (paths.RERUNS_HELDOUT, reruns, "_heldout.csv"),
+        "subspaces": (paths.SUBSPACES, subspaces, ".h5"),
+        "subspace_rows": (paths.SUBSPACES_TRAIN, subspaces, ".csv"),
+        "subspace_rows_heldout": (paths.SUBSPACES_HELDOUT, subspaces, "_heldout.csv"),
+    }  # fmt: skip
     return {
-        "references": [written(tmp_path / "references.csv", *references)],
-        "runs": each(paths.RERUNS, reruns),
-        "rows": each(paths.RERUNS_TRAIN, beside(reruns, ".csv")),
-        "rows_heldout": each(paths.RERUNS_HELDOUT, beside(reruns, "_heldout.csv")),
-        "subspaces": each(paths.SUBSPACES, subspaces),
-        "subspace_rows": each(paths.SUBSPACES_TRAIN, beside(subspaces, ".csv")),
-        "subspace_rows_heldout": each(paths.SUBSPACES_HELDOUT, beside(subspaces, "_heldout.csv")),
+        **{n: [p.file(f"{path}{end}") for path in own] for n, (p, own, end) in places.items()},
+        "references": pd.DataFrame(references),
         "timings": timings,
         "frame_times": NOT_TIMED,
-        "sensitivity": sensitivity([File(str(path), {})]),
+        "sensitivity": sensitivity(perturbed_runs()),
         "horizon": Horizon(perturbation=1e-10, threshold=1e-3),
     }
 
@@ -255,7 +241,7 @@ def test_held_out_runs_are_judged_by_their_own_horizon(files):
     assert table.relative_error_within_horizon[1] == pytest.approx(0.5)
 
 
-def sweep(folder, **changes) -> File:
+def sweep(**changes) -> pd.DataFrame:
     """Scene a with K = 2, 10 (its own) and 40, and a coarser mesh, all or with ``changes``."""
     rows = [
         {"iterations": k, "window": w, "vertices": n, "mesh_error": m,
@@ -265,18 +251,17 @@ def sweep(folder, **changes) -> File:
             (10, 5, 0.01, 9, None), (10, 0, 0.5, 4, None), (10, 5, 0.5, 4, None),
         )
     ]  # fmt: skip
-    return written(folder / "sweep.csv", *({"scene": "a", "frames": 2} | r | changes for r in rows))
+    return pd.DataFrame(rows).assign(scene="a", frames=2, **changes)
 
 
 def points(files, runs, other) -> pd.DataFrame:
-    """The table accuracy_cost of these runs, with the file of ``other`` iterations."""
-    own = {"a": 10, "b": 20}
-    return accuracy_cost(runs, NOT_TIMED, own, timings=files["timings"], sweeps=[other])
+    """The table accuracy_cost of these runs, with those of ``other`` iterations."""
+    return accuracy_cost(runs, files["timings"], NOT_TIMED, other, {"a": 10, "b": 20})
 
 
-def test_accuracy_cost_compares_all_runs_with_the_converged_one(files, tmp_path):
+def test_accuracy_cost_compares_all_runs_with_the_converged_one(files):
     """The run of the scene's iterations is there twice; 40 iterations lose to acceleration."""
-    table = points(files, reduced_reruns(**files), sweep(tmp_path))
+    table = points(files, reduced_reruns(**files), sweep())
     columns = ["scene", "method", "iterations", "vertices", "ms_per_frame", "pareto"]
     assert list(table[columns].itertuples(index=False, name=None)) == [
         ("a", "full", 10, 9, 8.0, True), ("a", "deim", 10, 9, 4.0, True),
@@ -295,18 +280,17 @@ def test_accuracy_cost_compares_all_runs_with_the_converged_one(files, tmp_path)
     assert found.reference_error.tolist() == [0.01] * 8
 
 
-def test_without_a_converged_run_there_is_no_point(files, tmp_path):
-    runs, none = reduced_reruns(**files), sweep(tmp_path, error_converged=None)
+def test_without_a_converged_run_there_is_no_point(files):
+    runs, none = reduced_reruns(**files), sweep(error_converged=np.nan)
     assert set(points(files, runs, none).method) == {"deim", "full", "ecsw-1e-02"}
     assert points(files, runs.assign(error_converged=None), none).empty
 
 
-def test_local_share_counts_assembly_and_is_the_share_of_the_whole_frame(tmp_path, files):
+def test_local_share_counts_assembly_and_is_the_share_of_the_whole_frame(files):
     table = local_share(files["timings"], NOT_TIMED)
     assert table.scene.tolist() == ["a", "a", "a", "b"]
     assert table.implementation.tolist() == ["interpreted", "numpy", "compiled", "compiled"]
     assert table.local_share.tolist() == pytest.approx([0.375] * 4)
     row = {"scene": "c", "implementation": "numpy", "vertices": 4, "local_ms": 2.0,
            "assembly_ms": 1.0, "global_ms": 1.0, "method": None, "ms_per_frame": 6.0}  # fmt: skip
-    path = written(tmp_path / "c.csv", row)
-    assert local_share([path], NOT_TIMED).local_share.tolist() == [0.5]
+    assert local_share(pd.DataFrame([row]), NOT_TIMED).local_share.tolist() == [0.5]

@@ -1,11 +1,11 @@
 """Declarations: what they refuse, what they make of a frame, and that the study's are sound."""
 
+import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machines.same_results import without_times
 from pdrom.core.errors import StorageError
 from pdrom.core.store import read_table, write_table
 from study.artifact.reads import Setting
@@ -53,14 +53,14 @@ def test_a_table_without_rows_has_its_columns_in_a_file_too(content, tmp_path):
     assert tuple(read_table(tmp_path / "t.csv").columns) == invented.column_names
 
 
-def test_flags_survive_a_part_without_any():
+@pytest.mark.parametrize("order", [(0, 1), (1, 0), (0, 1, 2)])
+def test_flags_survive_a_part_without_any(order):
     """A file in which nothing ran has a column of empty numbers."""
-    parts = [pd.DataFrame([ROW]), pd.DataFrame([ROW | {"good": float("nan")}])]
-    for order in (parts, parts[::-1], [parts[0], parts[1], parts[0].astype({"good": float})]):
-        made = invented.checked(pd.concat(order, ignore_index=True))
-        expected = [pd.notna(part.good[0]) for part in order]
-        assert made.good.notna().tolist() == expected
-        assert made.good.dropna().all()
+    cells = pd.Series([True]), pd.Series([np.nan]), pd.Series([1.0])
+    rows = pd.DataFrame([ROW] * len(order)).drop(columns="good")
+    good = invented.checked(rows.assign(good=pd.concat([cells[i] for i in order]).array)).good
+    assert good.notna().tolist() == [i != 1 for i in order]
+    assert good.dropna().all()
 
 
 def test_columns_are_put_in_order_and_numbers_written_alike_whatever_they_came_as(tmp_path):
@@ -76,11 +76,11 @@ def test_columns_are_put_in_order_and_numbers_written_alike_whatever_they_came_a
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        (ROW | {"count": 1.5}, "table invented: column 'count' is no integer"),
-        (ROW | {"count": "many"}, "column 'count' is no integer"),
-        (ROW | {"size": "large"}, "column 'size' is no number"),
-        (ROW | {"good": "perhaps"}, "column 'good' is no flag"),
-        ({"name": "a", "size": 1.0, "seconds": 2.0}, r"invented: lacks .* count, good"),
+        (ROW | {"count": 1.5}, "invented: .*'count'"),
+        (ROW | {"count": "many"}, "'count'"),
+        (ROW | {"size": "large"}, "'size'"),
+        (ROW | {"good": "perhaps"}, "'good'"),
+        ({"name": "a", "size": 1.0, "seconds": 2.0}, "invented: .* count, good"),
     ],
 )
 def test_what_does_not_fit_is_named_with_its_column(row, message):
@@ -102,17 +102,6 @@ def test_a_faulty_declaration_is_refused(columns, reads, message):
         @table(title="", columns=columns, reads=reads)
         def lonely(rows):
             """Nothing."""
-
-
-def test_only_times_may_differ(tmp_path):
-    def seen(**changes):
-        return without_times(invented, invented([ROW | changes]), tmp_path)
-
-    assert seen(seconds=9.0).equals(seen())
-    assert seen(seconds=None).equals(seen())
-    for name, other in {"name": "b", "count": 4, "size": 0.25, "good": False}.items():
-        assert not seen(**{name: other}).equals(seen())
-        assert not seen(**{name: None}).equals(seen())
 
 
 def test_every_column_says_what_it_is_and_a_measured_time_is_timed():
