@@ -151,21 +151,17 @@ def claims_page(
 
 def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFrame) -> str:
     rows = "<tr><th>test</th><th>rule</th><th>rows that satisfy it</th><th>found</th></tr>"
+    place = f"tables/claims_tests.html#claim={name}|part={part}|satisfied"
     for rule, row in zip(rules, tests[tests.part == part].itertuples(), strict=True):
         aside = "" if rule.decides else " (beside the verdict)"
-        place = f"tables/claims_tests.html#claim={name}|part={part}|satisfied"
         spread = f"{row.least:.2g} to {row.most:.2g}, median {row.median:.2g}: "
-        values = "" if pd.isna(row.least) else spread
         rows += (
             f"<tr><td>{escape(rule.what)}{aside}</td><td>{_rule(rule)}</td>"
             f"<td><a class=val href='{place}'>{row.satisfied} of {row.of}</a></td>"
-            f"<td>{values}{escape(row.verdict)}</td></tr>"
+            f"<td>{'' if pd.isna(row.least) else spread}{escape(row.verdict)}</td></tr>"
         )
-    label = f"Tests of {name}, {part}"
-    return (
-        f"<h3>{PARTS[part]}</h3><div class=scroll tabindex=0 role=region aria-label='{label}'>"
-        f"<table>{rows}</table></div>"
-    )
+    region = f"class=scroll tabindex=0 role=region aria-label='Tests of {name}, {part}'"
+    return f"<h3>{PARTS[part]}</h3><div {region}><table>{rows}</table></div>"
 
 
 def _rule(rule: TestRule) -> str:

@@ -101,7 +101,7 @@ def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the TeX ``table`` with its numbers as links to rows of the study's tables.
 
     All links lead to the one of ``tables`` with most columns in common with ``table``: to row i
-    from row i if both have as many rows, or else to the rows with equal cells in common columns, but
+    from row i if both have as many rows, or else to rows with equal cells in common columns, but
     for columns in which no row has an equal cell (rounded numbers, sums, titles).
     """
     (columns, header), *body = table

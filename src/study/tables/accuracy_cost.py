@@ -122,16 +122,14 @@ def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
 def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     """Smallest size from which on the reduced local step costs at least as much as the full one.
 
-    The ratio of both times at each size ``r`` (ascending) is interpolated linearly between the last
-    size with a ratio below one and the next. Return None if the ratio is below one at the largest
-    size; if it never is, the smallest size.
+    The ratio of both times at each size ``r`` (ascending) is interpolated linearly after the last
+    size with a ratio below one. Return None if that is the largest, the smallest if there is none.
     """
     sizes, values = np.asarray(r, dtype=float), np.asarray(ratio, dtype=float)
     below = np.flatnonzero(values < 1.0)
     if len(below) == 0:
         return int(sizes[0])
-    last = below[-1]
-    if last == len(values) - 1:
+    if (last := below[-1]) == len(values) - 1:
         return None
     (a, b), (low, high) = sizes[last : last + 2], values[last : last + 2]
     return int(np.ceil(a + (b - a) * (1.0 - low) / (high - low) - 1e-9))

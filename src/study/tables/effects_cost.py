@@ -129,8 +129,7 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
 def local_share(timings: pd.DataFrame, frame_times: pd.DataFrame) -> pd.DataFrame:
     """One row per scene and implementation of the local step, with its share of the frame's time.
 
-    The share includes the assembly of the right-hand side, which compiled kernels compute together
-    with the projections. Times are scaled to those in ``frame_times`` (`in_one_time`).
+    The share includes the right-hand side, which compiled kernels compute with the projections.
     """
     times = results.timings_in_one_time(timings, frame_times)
     full = times[times.method.isna()]

@@ -205,13 +205,11 @@ def _frontier(rows: pd.DataFrame, ratios: pd.DataFrame) -> pd.DataFrame:
     setting = rows.groupby(SETTING, sort=False, dropna=False).ngroup()
     made = rows.groupby(setting).first()
     made = made.assign(simulated=made.vertices, vertices=vertices)
-    tested, blown = rows.motion.isin(MOTIONS), np.isinf(rows.error)
-    errors = {"error": rows.error, "deformation": rows.deformation_error.mask(blown, np.inf)}
-    names = {"validation_error": "error", "validation_deformation": "deformation"}
-    names |= {"position_error": "error", "deformation_error": "deformation"}
-    for name, kind in names.items():
-        chosen = tested != name.startswith("validation")
-        made[name] = errors[kind][chosen].groupby(setting).max()
+    shape = rows.deformation_error.mask(np.isinf(rows.error), np.inf)
+    errors = pd.DataFrame({"position": rows.error, "shape": shape})
+    largest = errors.groupby([rows.motion.isin(MOTIONS), setting]).max()
+    made[["validation_error", "validation_deformation"]] = largest.loc[False]
+    made[["position_error", "deformation_error"]] = largest.loc[True]
     times = ratios.loc[rows.index].stack()
     made["time_ratio"] = times.groupby(setting[times.index.get_level_values(0)].to_numpy()).median()
     made["offline_ratio"] = rows.offline_ratio.groupby(setting).median()

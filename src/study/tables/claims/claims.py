@@ -148,10 +148,7 @@ def timed_columns(rule: ClaimRule) -> set[str]:
 
 
 def by_rules(timed: Callable[[ClaimRule, Any], set[str]]) -> TimedCells:
-    """Return a function for `Table.timed_cells` that calls ``timed`` for each row of the table.
-
-    ``timed`` gets the rule of the row's claim, and the row; it returns columns affected by times.
-    """
+    """Return a function for `Table.timed_cells` that calls ``timed`` with each row and its rule."""
 
     def timed_cells(table: pd.DataFrame, **files: Path) -> list[set[str]]:
         rules = load_claims(files["rules"])
@@ -315,9 +312,8 @@ def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.
 
 
 def _verdict(tests: Sequence[TestRule], rows: _Rows) -> str:
-    return combined(
-        [answer_of(t, r[VALUE].to_numpy(float)) for t, r in zip(tests, rows, strict=True)]
-    )
+    values = [found[VALUE].to_numpy(float) for found in rows]
+    return combined(list(map(answer_of, tests, values)))
 
 
 def _with(test: TestRule, **changes: Any) -> TestRule:

@@ -1,16 +1,7 @@
 """Declaration of a table: its title, columns, inputs, and the function that computes it.
 
-A table is declared by a decorator on the function that computes it::
-
-    @table(
-        title="What part of a frame the local step takes",
-        columns=(*shared("scene"), timed(number("local_share", "local over all"))),
-        reads={"timings": Every(paths.TIMINGS), "wrong": Setting("stability.wrong")},
-    )
-    def local_share(timings: list[File], wrong: float) -> pd.DataFrame: ...
-
-The function gets its inputs by name: files as a list of `File`, tables as data frames, values of
-the configuration as plain data. The data frame it returns is then brought to the declared columns.
+The decorator `table` declares the function that computes it, as those of `study.artifact.artifact`
+do. The data frame that the function returns is brought to the declared columns.
 """
 
 import re
@@ -218,12 +209,10 @@ _SHARED = (
     number("stiffness", "factor on all weights of the scene", compared="exact"),
     integer("training_motions", "trajectories that a reduced model is trained on"),
     integer("skinning", "skinning columns beside its modes"),
-    timed(
-        number(
-            "time_ratio",
-            "time of a frame over that of ten plain iterations of projective dynamics on its own "
-            "mesh",
-        )
+    number(
+        "time_ratio",
+        "time of a frame over that of ten plain iterations of projective dynamics on its own mesh",
+        timed=True,
     ),
     timed(number("vertices_ratio", "of it, the positions of all vertices")),
     timed(number("offline_ratio", "time of its training over that of one plain frame")),
@@ -236,8 +225,7 @@ def shared(names: str) -> list[Column]:
     return [by_name[name] for name in names.split()]
 
 
-# Function of a table and the paths of project files; for each row, it returns the names of the
-# columns whose cell depends on timing.
+# Function of a table and of paths of project files: for each row, the columns that depend on times.
 TimedCells = Callable[..., Sequence[Collection[str]]]
 
 
