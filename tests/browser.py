@@ -31,10 +31,7 @@ def browser_or_skip() -> str:
 
 @contextmanager
 def page_at(address: str, width: int, height: int) -> Iterator[Page]:
-    """The page at ``address``; its ``said`` are its messages, its ``asked`` the addresses it loads.
-
-    ``width`` and ``height`` are in pixels.
-    """
+    """The page at ``address``; ``said`` are its messages, ``asked`` the addresses that it loads."""
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path=browser_or_skip(), args=OPTIONS)
         page = browser.new_page(viewport={"width": width, "height": height})

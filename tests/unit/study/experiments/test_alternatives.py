@@ -51,7 +51,7 @@ def written(tmp_path_factory):
 @pytest.fixture(scope="module")
 def table(written):
     parts, times = written
-    return alternatives([parts], [times], [])
+    return alternatives([parts], read_table(times.path), [])
 
 
 def test_rows_of_a_scene(written, table):

@@ -9,7 +9,7 @@ import pytest
 from builders import TOP, make_scene
 from pdrom.core.errors import PdromError
 from pdrom.core.provenance import made_by
-from pdrom.core.store import read_table, write_table
+from pdrom.core.store import read_table
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.mesh.types import save_mesh
 from pdrom.model.scene import SceneConfig
@@ -63,7 +63,7 @@ def test_every_model_has_its_errors_and_its_time_in_a_fresh_process(written):
     assert train.position_basis.tolist() == ["pod", "pod", "pod", "skinning"]
     assert train.method.tolist() == ["ecsw-3e-01", "ecsw-1e-02", "hrpd", "hrpd"]
     assert train.tau.tolist()[:2] == [0.3, 1e-2]
-    table = online([File(str(path), {})], [times], frame_times([times]))
+    table = online(rows, timed, frame_times(timed))
     assert len(table) == len(train)
     assert (table.vertices == 56).all()
     assert (table.elements == scene.groups[0].elements).all()
@@ -83,8 +83,8 @@ def test_every_model_has_its_errors_and_its_time_in_a_fresh_process(written):
     np.testing.assert_allclose(table.speedup, full / table.ms_per_frame)
     # the files hold the same models
     assert table.ms_per_frame.tolist() == timed.ms_per_frame[2:].tolist()
-    files = {"parts": [times], "large": [File(str(path), {})], "projections": [], "subspaces": []}
-    quoted = speedups(frame_times([times]), NO_RERUNS, **files)
+    none = pd.DataFrame()
+    quoted = speedups(timed, frame_times(timed), none, none, rows, NO_RERUNS)
     for column, own in (("error_train", "train"), ("error_heldout_high", "heldout_high")):
         assert quoted[column].tolist() == table[f"relative_error_{own}"].tolist()
     assert (quoted.reduction_s > 0.0).all()
@@ -96,14 +96,11 @@ def test_a_process_that_fails_is_told(written):
         in_processes([missing], ONCE)
 
 
-def test_a_motion_that_blows_up_has_an_infinite_error(written, tmp_path):
-    _, path, times = written
-    rows = read_table(path)
+def test_a_motion_that_blows_up_has_an_infinite_error(written):
+    rows, timed = (read_table(path) for path in (written[1], written[2].path))
     chosen = rows[(rows.method == "ecsw-1e-02")].copy()
     chosen["relative_error"] = [0.1, 0.2, None, 0.3]
     chosen["blowup_frame"] = [None, None, 3, None]
-    write_table(chosen, tmp_path / "rows.csv")
-    table = online([File(str(tmp_path / "rows.csv"), {})], [times], frame_times([times]))
-    (row,) = table.itertuples()
+    (row,) = online(chosen, timed, frame_times(timed)).itertuples()
     found = (row.relative_error_heldout, row.relative_error_heldout_high)
     assert (row.relative_error_train, *found) == (0.1, 0.3, np.inf)

@@ -43,17 +43,17 @@ def made(folder, *recorded, runs=RUNS, cases=CASES, **changes) -> tuple[pd.DataF
     The second process is twice as slow; reduced models have these times in the first trajectory and
     twice these in others.
     """
-    common = {"scene": "s", "factor": 1.0, "stiffness": 1.0, "substeps": 1, "finite": True}
-    common |= {"frames": 5, "elements_sampled": 3, "training_residual": 0.0}
-    common |= {"implicit_error": 0.01}
-    common |= {"implicit_deformation_error": 0.01, "offline_s": 3.0, "vertices_ms": 0.1}
-    rows = pd.concat([
-        runs.assign(motion=motion, error_implicit=runs.error_implicit * factor,
-                    mesh_error=np.where(runs.index == 0, 0.03, np.nan))
+    runs = runs.assign(mesh_error=np.where(runs.index == 0, 0.03, np.nan))
+    rows = [
+        runs.assign(motion=motion, error_implicit=runs.error_implicit * factor)
         for motion, factor in cases.items()
-    ], ignore_index=True).assign(**common)  # fmt: skip
-    rows["deformation_error"] = 2.0 * rows.error_implicit
-    rows = rows.assign(**changes)
+    ]
+    rows = pd.concat(rows, ignore_index=True).assign(
+        scene="s", factor=1.0, stiffness=1.0, substeps=1, finite=True, frames=5,
+        elements_sampled=3, training_residual=0.0, implicit_error=0.01,
+        implicit_deformation_error=0.01, offline_s=3.0, vertices_ms=0.1,
+        deformation_error=lambda rows: 2.0 * rows.error_implicit,
+    ).assign(**changes)  # fmt: skip
     timed = rows[rows.ms_per_frame.notna() & rows.motion.isin(MOTIONS)]
     slower = (timed.motion != "heldout") & timed.method.str.startswith("ecsw")
     ms = timed.ms_per_frame.where(~slower, 2 * timed.ms_per_frame)

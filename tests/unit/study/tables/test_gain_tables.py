@@ -107,23 +107,19 @@ def test_interventions_compare_runs_on_one_basis():
 
 
 def test_scenes_count_once_however_many_sizes_they_have():
-    reruns, _ = tables()
-    parts = []
-    ratios, numbers = (0.5, 2.0, 0.25, 0.1, 1.0), (40, 2, 3, 2, 2)
-    for scene, ratio, sizes in zip("stuvw", ratios, numbers, strict=True):
-        for r in range(1, sizes + 1):
-            for method, gain, error in (
-                ("pod", 1, 1e-3),
-                ("block-deim", 8, 1e-2),
-                # one error of "u" rises so much that its mean would rise, its median falls
-                ("gappy", 4, 1e-2 * (9.0 if (scene, r) == ("u", 3) else ratio)),
-            ):
-                row = reruns.iloc[0].to_dict() | {"scene": scene, "r": r, "method": method}
-                row |= {"relative_error_within_horizon": error}
-                gains = {"scene": scene, "group": "spring", "method": method, "r": r, "gain": gain}
-                gains |= {"split": "train", "relative_error": 0.1, "elements_sampled": 9}
-                parts.append((row, gains))
-    read = (pd.DataFrame(list(rows)) for rows in zip(*parts, strict=True))
+    # one error of "u" rises so much that its mean would rise, its median falls
+    ratios = {"s": [0.5] * 40, "t": [2.0] * 2, "u": [0.25, 0.25, 9.0], "v": [0.1] * 2, "w": [1, 1]}
+    rows = [
+        (scene, *row)
+        for scene, own in ratios.items()
+        for r, ratio in enumerate(own)
+        for row in (("pod", r, 1, 1e-3), ("block-deim", r, 8, 1e-2), ("gappy", r, 4, 1e-2 * ratio))
+    ]
+    runs = frame("scene method r gain relative_error_within_horizon", *rows).assign(
+        group="spring", position_basis="full", motion="train", max_extent=1.0, blowup_frame=None,
+        sensitivity_floor=1e-8,
+    )  # fmt: skip
+    read = (runs.drop(columns="gain"), runs.assign(split="train"))
     step, ordered = gain_interventions(*read, square()).query("mesh == 'all'").itertuples()
     assert (step.pairs, step.scenes, step.families_fallen, step.families) == (49, 5, 3, 5)
     # the gain falls everywhere, the error not in the two pairs of t and of w and in one of u

@@ -204,14 +204,6 @@ def test_a_share_of_rows_must_agree_and_ratios_near_the_limit_decide_nothing(
     assert (found["verdict"], found["measured"]) == (expected, "0.5 to 0.75")
 
 
-def test_a_condition_breaks_the_answer_down():
-    for threshold, margin, told in ((0.6, 1.0, True), (0.6, 1.6, True), (0.5, 1.0, False)):
-        test = rule("local_share", ">=", threshold, margin=margin, by="scene", **COMPILED)
-        condition = verdicts.outcome(test, tables())["condition"]
-        assert ("a 1 of 1, b 0 of 1" in condition) == told == bool(condition)
-        assert ("1 of 2 within a factor 1.6" in condition) == (margin == 1.6)
-
-
 @given(st.lists(st.floats(0.01, 100.0), min_size=1, max_size=20), st.data())
 def test_no_machine_refutes_what_holds_on_one_twice_as_fast(ratios, data):
     """Ratios that move by less than the margin squared do not cross both of its ends."""
@@ -306,6 +298,7 @@ def test_verdicts_by_both_errors_are_those_of_the_larger_one(tmp_path):
         ({"metric": "rerun_error", "margin": 2}, "margin = 2"),
         ({"by": "colour"}, "by: .*'colour'"),
         ({"where": {"scene": ["@al"]}}, "'al'"),
+        ({"what": 3}, r"published\.0\.what"),
     ],
 )
 def test_faulty_rules_name_file_claim_and_key(tmp_path, fault, message):
@@ -327,25 +320,11 @@ def test_a_set_stands_for_its_values_and_those_that_a_study_adds(tmp_path):
         load_claims(path, {"end": ("z",)})
 
 
-def test_changes_are_told_in_their_order(tmp_path):
-    path = tmp_path / "claims.yaml"
-    changes = [
-        {"date": date, "after_data": known, "reason": "A long enough reason."}
-        for date, known in (("2026-01-31", False), ("2026-02-01", True))
-    ]
-    path.write_text(yaml.safe_dump({"C1": claim({}) | {"changes": changes}}))
-    told = claims(path, {}, **whole()).history[0]
-    assert told.index("2026-01-31") < told.index("2026-02-01 (results were known)")
-    path.write_text(yaml.safe_dump({"C1": claim({}) | {"changes": changes[::-1]}}))
+def test_changes_are_in_their_order(tmp_path):
+    path, change = tmp_path / "claims.yaml", claim({})["changes"][0]
+    later = change | {"date": "2026-02-01", "after_data": True}
+    path.write_text(yaml.safe_dump({"C1": claim({}) | {"changes": [later, change]}}))
     with pytest.raises(ConfigurationError, match="changes"):
-        load_claims(path)
-
-
-@pytest.mark.parametrize("content", ["[]", "C1: 3", "C1: {published: []}", "sets: {a: [b]}"])
-def test_files_that_hold_no_claims_are_refused(tmp_path, content):
-    path = tmp_path / "claims.yaml"
-    path.write_text(content)
-    with pytest.raises(ConfigurationError, match=r"claims\.yaml"):
         load_claims(path)
 
 
@@ -390,11 +369,7 @@ def test_held_out_motions_decide_by_their_median():
     where = {"position_basis": ["full"]}
     names = ("rerun_error", "heldout_rerun_error")
     own, unseen = (verdicts.values_of(rule(name, where=where), tables()) for name in names)
-    assert unseen.value.tolist() == (2.0 * own.value).tolist()
-    assert unseen.method.tolist() == own.method.tolist()
-    none = tables()
-    none["reduced_reruns"] = none["reduced_reruns"].assign(horizon_frame=0)
-    assert verdicts.values_of(rule("heldout_rerun_error"), none).empty
+    pd.testing.assert_frame_equal(unseen.assign(value=0.5 * unseen.value), own, check_dtype=False)
 
 
 @pytest.mark.parametrize("name", RULES)
@@ -494,10 +469,10 @@ def test_every_test_says_what_it_found_and_those_that_decide_give_the_by_variati
     tables["local_share"] = shares.assign(implementation="compiled")
     outcomes = claims_tests(PATH, {}, **tables)
     one = outcomes[(outcomes.claim == "C1") & (outcomes.part == "beyond")].iloc[0]
-    assert (one.satisfied, one.of, one.close, one.verdict) == (2, 3, 2, verdicts.MACHINE)
-    assert (one.margin, one.least, one["median"], one.most) == (4.0, 0.2, 0.8, 0.9)
+    names = ["satisfied", "of", "close", "verdict", "margin", "least", "median", "most"]
+    assert one[names].tolist() == [2, 3, 2, MACHINE, 4.0, 0.2, 0.8, 0.9]
     nothing = outcomes[outcomes.of == 0]
-    assert (nothing.verdict == verdicts.UNDECIDED).all()
+    assert (nothing.verdict == UNDECIDED).all()
     assert nothing[["least", "median", "most"]].isna().all(axis=None)
     # words tell the tests of a part apart
     assert not outcomes.duplicated(["claim", "part", "what"]).any()
