@@ -169,11 +169,11 @@ def _rule(rule: TestRule) -> str:
     where = "; ".join(
         f"{column}: {', '.join(map(str, values))}" for column, values in rule.where.items()
     )
-    sign = {">=": "at least", "<=": "at most"}[rule.compare]
     margin = f"; ratios within a factor {rule.factor:g} decide nothing" if rule.timed else ""
     return (
         f"<code>{rule.metric}</code> of <a href='tables/{table}.html'>{table}</a>"
-        f"{f' ({escape(where)})' if where else ''} {sign} {rule.threshold:g}, "
+        f"{f' ({escape(where)})' if where else ''} "
+        f"{'at least' if rule.compare == '>=' else 'at most'} {rule.threshold:g}, "
         f"in {rule.share:.0%} of the rows{margin}; <code>./reproduce {argument(table)}</code>"
     )
 

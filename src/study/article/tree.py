@@ -163,9 +163,8 @@ def _heard(text: str) -> Node:
 def _captioned(node: Node, opening: str) -> Node:
     """Return a figure or table whose caption begins with ``opening`` (such as "Table 3.")."""
     attribute, (short, blocks), *others = node["c"]
-    words_of_caption = blocks[0]["c"] if blocks else []
-    strong = {"t": "Strong", "c": words(opening)}
-    opened = {"t": "Plain", "c": [strong, {"t": "Space"}, *words_of_caption]}
+    strong, first = {"t": "Strong", "c": words(opening)}, blocks[0]["c"] if blocks else []
+    opened = {"t": "Plain", "c": [strong, {"t": "Space"}, *first]}
     return {"t": node["t"], "c": [attribute, [short, [opened, *blocks[1:]]], *others]}
 
 

@@ -9,14 +9,11 @@ from study.artifact.artifact import Artifact
 from study.artifact.paths import LIVE_MODEL, LIVE_PAGE, File
 from study.artifact.reads import Every, ProjectFile
 
-# Folder of the model files, relative to the page.
-MODELS = Path(LIVE_MODEL.pattern).parent.name
-
 
 def _write(models: list[File], outputs: Mapping[str, str], parts: list[Path]) -> None:
     """Write the page with a list of the scenes of ``models``, those without any left out."""
     scenes = [
-        {"scene": file["scene"], "file": f"{MODELS}/{Path(file.path).name}"}
+        {"scene": file["scene"], "file": "/".join(Path(file.path).parts[-2:])}
         for file in models
         if '"models":[]' not in read_text(file.path)
     ]

@@ -19,7 +19,6 @@ from study.tables.kit import declaration, results
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, timed
 from study.tables.kit.results import DEFORMATION, ERROR, EXPERIMENT, FAILED, Rows
 
-FEWER = "fewer-iterations"
 _POINT = [ERROR, "ms_per_frame"]
 
 
@@ -88,7 +87,6 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 
 # Columns that identify a curve (time of the local step over size r); its rows differ only in r.
 CURVE = ["scene", "group", "method", "factor"]
-OWN_MESH = "1"  # value of the column ``factor`` for a scene's configured mesh
 SHARE = 1e-3  # table payoff omits groups with at most this share of all forces in a scene
 
 
@@ -107,7 +105,7 @@ SHARE = 1e-3  # table payoff omits groups with at most this share of all forces 
 )
 def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
     """One row per scene, group, method, mesh and size r: local-step times, and `break_even`."""
-    rows = results.joined([*own, *(file for file in sized if file["factor"] != OWN_MESH)])
+    rows = results.joined([*own, *(file for file in sized if file["factor"] != "1")])  # not the own mesh again
     if rows.empty:
         return rows
     for part, name in (("local", "ratio"), ("solve", "solve_ratio"), ("lift", "lift_ratio")):
@@ -173,8 +171,7 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
     iterations and on coarser meshes (from ``points``), which need no training. Motions whose
     converged run is not known well enough are left out.
     """
-    shares = effects.set_index(["scene", "effect"]).force_share
-    weak = shares.index[shares <= SHARE]
+    weak = effects[effects.force_share <= SHARE].rename(columns={"effect": "group"})
     found = []
     for measure in results.MEASURES:
         judged = results.judged_by(results.against_converged(reruns), measure, FAILED)
@@ -184,11 +181,11 @@ def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) ->
 
 
 def _summaries(
-    reruns: pd.DataFrame, whole: pd.DataFrame, weak: pd.MultiIndex
+    reruns: pd.DataFrame, whole: pd.DataFrame, weak: pd.DataFrame
 ) -> Iterator[dict[str, object]]:
     """Yield a row for each method in ``whole`` and ``reruns``, without groups that are ``weak``."""
     runs = results.trained(reruns).dropna(subset=["speedup", "max_extent"])
-    runs = runs[~pd.MultiIndex.from_frame(runs[EXPERIMENT]).isin(weak)]
+    runs = runs[~results.among(runs, weak, EXPERIMENT)]
     runs = pd.concat([whole, results.with_held_out(runs, reruns)], ignore_index=True)
     for (basis, method), own in runs.groupby(["position_basis", "method"], sort=False):
         accurate = own[own[ERROR] <= FAILED]
@@ -222,8 +219,11 @@ def _summaries(
 def _full_order(points: pd.DataFrame) -> pd.DataFrame:
     """Runs of ``points`` with fewer iterations or coarser meshes, and their speed-ups."""
     full = points[(points.method == "full") & (points.position_basis == "full")].set_index("scene")
-    fewer = (points.method == FOM) & (points.iterations < points.scene.map(full.iterations))
-    coarser = points[points.method.str.startswith(COARSER)]
-    found = pd.concat([points[fewer].assign(method=FEWER), coarser.assign(method=COARSER)])
+    early = points.iterations < points.scene.map(full.iterations)
+    fewer = points[(points.method == FOM) & early].assign(method="fewer-iterations")
+    coarser = points[points.method.str.startswith(COARSER)].assign(method=COARSER)
+    found = pd.concat([fewer, coarser])
+        [points[fewer].assign(method="fewer-iterations"), coarser.assign(method=COARSER)]
+    )
     speedup = found.scene.map(full.ms_per_frame) / found.ms_per_frame
     return found.assign(group="all", speedup=speedup)

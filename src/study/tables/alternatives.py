@@ -71,11 +71,10 @@ def alternatives(parts: list[paths.File], times: pd.DataFrame, record: list[Path
     rows = results.joined(parts)
     if len(rows):
         rows, ms, plain = beside(rows, times)
-        rows = rows.assign(ms_per_frame=ms.median(axis=1), processes=ms.count(axis=1))
-        rows["time_ratio"] = (ms / plain).median(axis=1)
-        per_ms = rows.time_ratio / rows.ms_per_frame
-        rows["vertices_ratio"] = per_ms * rows.vertices_ms
-        rows["offline_ratio"] = 1e3 * per_ms * rows.offline_s
+        whole, ratio = ms.median(axis=1), (ms / plain).median(axis=1)
+        rows = rows.assign(ms_per_frame=whole, processes=ms.count(axis=1), time_ratio=ratio)
+        rows["vertices_ratio"] = ratio / whole * rows.vertices_ms
+        rows["offline_ratio"] = 1e3 * (ratio / whole) * rows.offline_s
     return results.with_recorded(rows, record, alternatives.columns)
 
 

@@ -72,22 +72,16 @@ def effects_cost(
         removed = results.in_one_time(left_out, whole, frame_times, columns=times)
         names = {"left_out": "effect", "ms_per_frame": "without_ms", "own_ms": "ms_per_frame"}
         removed = removed.rename(columns=names)
-        tables.append(removed[_absent(removed, costs)].assign(role=SEVERAL))
+        tables.append(removed[~results.among(removed, costs, KEYS)].assign(role=SEVERAL))
         tables[0] = costs.merge(removed[[*KEYS, "groups", "without_ms"]], on=KEYS, how="left")
     if len(contributions):
         acting = _acting(contributions, sensitivity, horizon)
         tables[0] = tables[0].merge(acting, on=KEYS, how="left")
-        tables.append(acting[_absent(acting, costs)])
+        tables.append(acting[~results.among(acting, costs, KEYS)])
     made = pd.concat(tables, ignore_index=True)
     order = made.groupby("scene", sort=False).ngroup().argsort(kind="stable")
     made = made.reindex(columns=effects_cost.column_names).iloc[order]
     return made.assign(role=made.role.mask(made.effect.isin([RIGHT, GLOBAL, REST]), PHASE))
-
-
-def _absent(rows: pd.DataFrame, others: pd.DataFrame) -> np.ndarray:
-    """Boolean array: True for ``rows`` whose scene and effect occur in no row of ``others``."""
-    keys, known = (pd.MultiIndex.from_frame(each[KEYS]) for each in (rows, others))
-    return ~keys.isin(known)
 
 
 def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -> pd.DataFrame:
@@ -96,10 +90,9 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
         force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
         energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
     )
-    length = frames.groupby("scene").frame.max() + 1
     # effects that set the start have only a row for frame 0: average their force over all frames
-    starts = made.role == "start"
-    made.loc[starts, "force"] /= np.sqrt(made.scene[starts].map(length).to_numpy(float))
+    length = made.scene.map(frames.groupby("scene").frame.max() + 1)
+    made.loc[made.role == "start", "force"] /= np.sqrt(length)
     made["force_share"] = made.force / made.groupby("scene").force.transform("sum")
     ends = horizons(sensitivity, horizon.perturbation, horizon.threshold)
 
@@ -181,10 +174,7 @@ _REDUCTION = ["scene", "group", "method", "r"]
 CONFIRMED = 1.5
 ENOUGH = 0.9  # of a processor, or else other programs have disturbed the times
 UNCONFIRMED = "not confirmed by its control"
-_ERRORS = {
-    "error_train": "relative_error_train", results.MEDIAN: "relative_error_heldout",
-    results.HIGH: "relative_error_heldout_high",
-}  # fmt: skip
+_ERRORS = {name: f"relative_{name}" for name in ("error_train", results.MEDIAN, results.HIGH)}
 _TRAIN = {results.ERROR: "error_train", results.DEFORMATION: "deformation_train"}
 _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high"]
 

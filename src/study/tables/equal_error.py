@@ -23,7 +23,6 @@ from study.tables.kit.results import Rows
 
 # The reduced model of `equal_error`; where a recording holds fewer modes, the nearest number.
 FIXED = ReducedModel(training_motions=(1, 2))
-NO_OPPONENTS = (CONVERGED, PLAYBACK, *REDUCTIONS)
 # Column of speed-ups -> column of the error that the full order must have at most.
 AHEAD = {
     "ahead": "validation_error", "ahead_test": "position_error",
@@ -91,7 +90,9 @@ def equal_error(
         scene, *_, motion = labels
         vertices, measured = case.vertices.max(), case[case.ms_per_frame.notna()]
         own = case[(case.method == CONVERGED) & (case.vertices == vertices)]
-        full = measured[~measured.method.isin(NO_OPPONENTS)].dropna(subset="error_implicit")
+        full = measured[~measured.method.isin([CONVERGED, PLAYBACK, *REDUCTIONS])].dropna(
+            subset="error_implicit"
+        )
         for model in _fixed(measured) if motion in MOTIONS and len(full) else ():
             row = {name: model[name] for name in equal_error.column_names if name in model}
             row |= {

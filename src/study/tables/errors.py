@@ -171,9 +171,8 @@ STEPS = {
     "whole elements for single entries": ("deim", "block-deim"),
     "three elements a mode for one": ("block-deim", "gappy"),
 }
-# Change -> methods of table ladder before and after it: one set of coefficients for x, y and z,
-# three elements a mode for one, or whole elements sampled instead of single rows (compared only if
-# elements have several rows).
+# Change -> methods of table ladder before and after it: shared coefficients for x, y and z, or more
+# samples (whole elements are compared with single rows only if elements have several rows).
 _SAMPLES = "single rows", "whole elements", "three elements"
 SQUARE = {
     **{f"shared coefficients, {own}": (f"{own}, separate", f"{own}, shared") for own in _SAMPLES},
@@ -190,7 +189,7 @@ KINDS = {
 }
 _PLACE = ["scene", "group", "r"]
 VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # groups on tetrahedra
-MESHES = ALL, SHEETS, BARS = "all", "sheets", "bars"
+MESHES = "all", "sheets", "bars"
 # Constructs a column of numbers that summarise many runs, with the tolerance of "share" columns.
 share = partial(number, compared="share")
 
@@ -287,7 +286,7 @@ def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
     # not imported at the top: SciPy's import takes a second, which planning the workflow saves
     from scipy.stats import binomtest
 
-    by_family = pairs.groupby(results.families(pairs.scene)).error
+    by_family = pairs.groupby(pairs.scene.str.removesuffix(results.TWIN)).error
     fallen = int((by_family.median() < 1.0).sum())
     values = [own.to_numpy(float) for _, own in by_family]
     # bootstrap of the median error ratio: families of scenes are drawn with replacement

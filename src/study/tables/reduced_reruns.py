@@ -135,11 +135,10 @@ def _errors(
 def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     """Return ``runs`` with columns of times and speed-ups over the compiled full-order run."""
     full = times[times.method.isna() & (times.implementation == "compiled")]
-    reference = full.set_index("scene").ms_per_frame
-    reduced = times[times.method.notna()].copy()
-    reduced["position_basis"] = reduced.position_basis.fillna("full")
+    reduced = times[times.method.notna()].fillna({"position_basis": "full"})
     reduced["local_ms"] += reduced.assembly_ms + reduced.lift_ms
-    reduced["speedup"] = reduced.scene.map(reference) / reduced.ms_per_frame
+    own = reduced.scene.map(full.set_index("scene").ms_per_frame)
+    reduced["speedup"] = own / reduced.ms_per_frame
     # match rows of subspace models by the size k, as their r is the number of sampled elements
     for rows in (runs, reduced):
         rows["size"] = rows.r.where(rows.position_basis == "full", rows.k).astype(float)
@@ -148,7 +147,6 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     return runs.merge(reduced[keys + measured], on=keys, how="left")
 
 
-# Possible outcomes of a run.
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
 SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # columns that identify a full-order run
 # Fraction of runs on degenerate meshes that may end otherwise than expected, due to round-off.
@@ -222,10 +220,11 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
     for run in files:
         with open_hdf5(run.path) as file:
             extents = np.ptp(file["positions"][...], axis=1).max(axis=1)
-        finite = bool(np.isfinite(extents).all())
-        rows.append((run["scene"], finite, float(extents[1:].max() / extents[0])))
-    made = pd.DataFrame(rows, columns=["scene", "finite", "max_extent"])
-    return made.assign(method="full", position_basis="full", energy_ratio=1.0, relative_error=0.0)
+        ends = {"finite": np.isfinite(extents).all(), "max_extent": extents[1:].max() / extents[0]}
+        rows.append({"scene": run["scene"], **ends})
+    return pd.DataFrame(rows).assign(
+        method="full", position_basis="full", energy_ratio=1.0, relative_error=0.0
+    )
 
 
 @table(

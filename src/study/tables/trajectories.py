@@ -72,9 +72,8 @@ def error_budget(rows: pd.DataFrame, references: pd.DataFrame) -> pd.DataFrame:
     """
     error = rows[results.DEFORMATION].fillna(rows.error).fillna(np.inf)
     before = error.shift().where(rows.part != SPAN, 0.0)
-    own = rows.part != FULL_ORDER
     with np.errstate(invalid="ignore"):
-        added = (error - before).where(own)
+        added = (error - before).where(rows.part != FULL_ORDER)
     trajectory = pd.Series(np.arange(len(rows)) // len(PARTS), rows.index)
     most = added == added.groupby(trajectory).transform("max")
     known = references[["scene", "motion", *results.OWN_ERRORS]]

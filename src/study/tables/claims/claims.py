@@ -33,16 +33,12 @@ def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
     return METRICS[test.metric].values(tables, dict(test.where), test.accuracy)
 
 
-def satisfied(test: TestRule, values: np.ndarray) -> np.ndarray:
-    """Boolean array: True for each of ``values`` that satisfies the comparison of ``test``."""
-    return values >= test.threshold if test.compare == ">=" else values <= test.threshold
-
-
-def close(test: TestRule, values: np.ndarray) -> np.ndarray:
-    """Boolean array: True for ratios of times that are too close to the threshold to decide."""
+def compared(test: TestRule, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whether each of ``values`` satisfies ``test``; whether it is a time too close to decide."""
+    passed = values >= test.threshold if test.compare == ">=" else values <= test.threshold
     ratio = METRICS[test.metric].ratio
     apart = ratio(values) / ratio(np.array(test.threshold))
-    return (apart > 1.0 / test.factor) & (apart < test.factor)
+    return passed, (apart > 1.0 / test.factor) & (apart < test.factor)
 
 
 def answer(share: float, good: int, total: int) -> str:
@@ -60,9 +56,9 @@ def answer(share: float, good: int, total: int) -> str:
 
 def answer_of(test: TestRule, values: np.ndarray) -> str:
     """Verdict of ``test``; "depends on the machine" if values near the threshold may change it."""
-    near = close(test, values)
-    sure, total = int((satisfied(test, values) & ~near).sum()), len(values)
-    answers = {answer(test.share, sure + more, total) for more in range(int(near.sum()) + 1)}
+    passed, near = compared(test, values)
+    sure, most = int((passed & ~near).sum()), int((passed | near).sum())
+    answers = {answer(test.share, good, len(values)) for good in range(sure, most + 1)}
     return answers.pop() if len(answers) == 1 else MACHINE
 
 
@@ -76,9 +72,10 @@ def outcome(test: TestRule, tables: Tables) -> dict[str, Any]:
     """
     rows = values_of(test, tables)
     values = rows[VALUE].to_numpy(float)
-    passed, near, total = satisfied(test, values), int(close(test, values).sum()), len(values)
-    good, verdict = int(passed.sum()), answer_of(test, values)
-    made: dict[str, Any] = {"least": None, "median": None, "most": None}
+    passed, close = compared(test, values)
+    good, near, total = int(passed.sum()), int(close.sum()), len(values)
+    verdict = answer_of(test, values)
+    made: dict[str, Any] = dict.fromkeys(("least", "median", "most"))
     made |= {"satisfied": good, "of": total, "close": near, "verdict": verdict, "condition": ""}
     if total == 0:
         why = "nothing to compare in this configuration"

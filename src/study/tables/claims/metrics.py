@@ -20,7 +20,6 @@ LABELS = (
     "scene", "group", "method", "position_basis", "k", "r", "split", "axis", "noisy_axes", "seed",
     "component", "implementation", "factor",
 )  # fmt: skip
-AXES = ("x", "y", "z")
 _RUN = [*EXPERIMENT, "method"]
 
 
@@ -49,7 +48,7 @@ def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 
 def by_axis(table: pd.DataFrame, where: Where) -> pd.DataFrame:
     """Rows that ``where`` selects, once per axis x, y, z with this axis's ``relative_error``."""
-    parts = [table.assign(axis=a, relative_error=table[f"relative_error_{a}"]) for a in AXES]
+    parts = [table.assign(axis=a, relative_error=table[f"relative_error_{a}"]) for a in "xyz"]
     return filtered(pd.concat(parts, ignore_index=True), where)
 
 
@@ -188,11 +187,9 @@ class Metric:
 
 _RERUNS, _RECONSTRUCTION = "reduced_reruns", "reconstruction_error"
 METRICS = {
-    # share of the local step in the time of a frame
     "local_share": Metric(
         lambda rows, _: rows.local_share, "local_share", timed=True, ratio=over_the_rest
     ),
-    # error over frames in which perturbed full-order runs agree; inf if the run blew up in them
     "rerun_error": Metric(lambda rows, _: rows[ERROR].fillna(np.inf), _RERUNS, reruns),
     "useful_speedup": Metric(useful_speedup, _RERUNS, reruns, timed=True),
     "best_useful_speedup": Metric(best_useful_speedup, _RERUNS, reruns, timed=True),

@@ -65,9 +65,7 @@ class TestRule(ConfigModel):
     @property
     def factor(self) -> float:
         """Margin of the test, by default `MARGIN`; 1 (no margin) if no times are compared."""
-        if not self.timed:
-            return 1.0
-        return MARGIN if self.margin is None else self.margin
+        return (self.margin or MARGIN) if self.timed else 1.0
 
     @model_validator(mode="after")
     def _metric_exists(self) -> Self:

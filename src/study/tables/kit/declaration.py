@@ -122,8 +122,7 @@ def interval(names: str, make: Callable[..., Column] = number, unit: str = "") -
 
 def extremes(name: str) -> list[Column]:
     """Return columns ``name_low``, ``name_high``: least and largest ``name`` of repeated runs."""
-    words = {"low": "least", "high": "largest"}
-    return [number(f"{name}_{end}", f"{word} {name}") for end, word in words.items()]
+    return [number(f"{name}_low", f"least {name}"), number(f"{name}_high", f"largest {name}")]
 
 
 # Makes a column of estimated errors of references, whose relative difference was 0.28 at most.
@@ -278,14 +277,13 @@ class Table(Artifact):
         if missing and len(table):
             raise StorageError(f"table {self.name}: lacks the column(s) {', '.join(missing)}")
         table = table.reindex(columns=list(self.column_names)).reset_index(drop=True)
-        return table.assign(**{c.name: self._cast(c, table[c.name]) for c in self.columns})
-
-    def _cast(self, column: Column, values: pd.Series) -> pd.Series:
-        try:
-            return column.cast(values)
-        except (TypeError, ValueError) as error:
-            place = f"table {self.name}: column '{column.name}'"
-            raise StorageError(f"{place} is no {column.kind} ({error})") from error
+        for column in self.columns:
+            try:
+                table[column.name] = column.cast(table[column.name])
+            except (TypeError, ValueError) as error:
+                place = f"table {self.name}: column '{column.name}'"
+                raise StorageError(f"{place} is no {column.kind} ({error})") from error
+        return table
 
 
 def table(

@@ -45,7 +45,7 @@ OWN_ERRORS = "reference_error", "reference_deformation_error"
 THIRD = 1.0 / 3.0  # largest error of a reference over a limit by which runs are judged
 ORTHOGONAL = "pod"  # method that evaluates all elements and projects onto the basis orthogonally
 FAILED = 0.1  # a run whose error over the compared frames exceeds this counts as failed
-TWIN = "_twin"
+TWIN = "_twin"  # at the end of the name of a scene's variant; both are a family
 
 
 def joined(files: Iterable[File]) -> pd.DataFrame:
@@ -82,8 +82,7 @@ def with_recorded(rows: pd.DataFrame, record: list[Path], known: Sequence[Column
     if rows.empty:
         return others.reindex(columns=[column.name for column in known])
     keys = [name for name in ("scene", "factor", "stiffness") if name in rows]
-    own = pd.MultiIndex.from_frame(rows[keys].astype(object))
-    others = others[~pd.MultiIndex.from_frame(others[keys].astype(object)).isin(own)]
+    others = others[~among(others, rows, keys)]
     return pd.concat([rows.assign(recorded=None), others], ignore_index=True)
 
 
@@ -102,8 +101,6 @@ def in_one_time(
 
 def timings_in_one_time(timings: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     """Rows of ``timings``, scaled by `in_one_time` to the full-order frame times of ``times``."""
-    if timings.empty:
-        return timings
     own = timings[timings.method.isna() & (timings.implementation == "compiled")]
     own = own.set_index("scene").ms_per_frame
     return in_one_time(timings, own, times, [name for name in PHASES if name in timings])
@@ -138,9 +135,10 @@ def _rounded(value: float) -> str:
     return f"{round(value, place):.{max(0, place)}f}"
 
 
-def families(scenes: pd.Series) -> pd.Series:
-    """Family of each scene: its name without the suffix `TWIN` of a scene's variant."""
-    return scenes.str.removesuffix(TWIN)
+def among(rows: pd.DataFrame, others: pd.DataFrame, keys: Sequence[str]) -> np.ndarray:
+    """Boolean array: True for ``rows`` whose cells in the columns ``keys`` a row of others has."""
+    own, known = (pd.MultiIndex.from_frame(e[[*keys]].astype(object)) for e in (rows, others))
+    return own.isin(known)
 
 
 def trained(reruns: pd.DataFrame) -> pd.DataFrame:

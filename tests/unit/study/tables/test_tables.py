@@ -284,6 +284,3 @@ def test_local_share_counts_assembly_and_is_the_share_of_the_whole_frame(files):
     assert table.scene.tolist() == ["a", "a", "a", "b"]
     assert table.implementation.tolist() == ["interpreted", "numpy", "compiled", "compiled"]
     assert table.local_share.tolist() == pytest.approx([0.375] * 4)
-    row = {"scene": "c", "implementation": "numpy", "vertices": 4, "local_ms": 2.0,
-           "assembly_ms": 1.0, "global_ms": 1.0, "method": None, "ms_per_frame": 6.0}  # fmt: skip
-    assert local_share(pd.DataFrame([row]), NOT_TIMED).local_share.tolist() == [0.5]
