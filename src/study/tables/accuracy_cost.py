@@ -105,7 +105,8 @@ SHARE = 1e-3  # table payoff omits groups with at most this share of all forces 
 )
 def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
     """One row per scene, group, method, mesh and size r: local-step times, and `break_even`."""
-    rows = results.joined([*own, *(file for file in sized if file["factor"] != "1")])  # not the own mesh again
+    # a factor of 1 would be the scene's own mesh again
+    rows = results.joined([*own, *(file for file in sized if file["factor"] != "1")])
     if rows.empty:
         return rows
     for part, name in (("local", "ratio"), ("solve", "solve_ratio"), ("lift", "lift_ratio")):
@@ -223,7 +224,5 @@ def _full_order(points: pd.DataFrame) -> pd.DataFrame:
     fewer = points[(points.method == FOM) & early].assign(method="fewer-iterations")
     coarser = points[points.method.str.startswith(COARSER)].assign(method=COARSER)
     found = pd.concat([fewer, coarser])
-        [points[fewer].assign(method="fewer-iterations"), coarser.assign(method=COARSER)]
-    )
     speedup = found.scene.map(full.ms_per_frame) / found.ms_per_frame
     return found.assign(group="all", speedup=speedup)
