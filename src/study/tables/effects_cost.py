@@ -16,7 +16,6 @@ KEYS = ["scene", "effect"]
 NOTHING = "nothing"  # value of column effect in a row of a scene from which nothing is left out
 PHASE, SEVERAL = "phase", "several"
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
-FEWEST = 3  # least number of mesh sizes to which a power law is fitted (table `scaling`)
 
 
 @table(
@@ -157,13 +156,11 @@ def scaling(rows: pd.DataFrame) -> pd.DataFrame:
     own = rows[rows.method == FOM].set_index(["scene", "vertices"])
     mesh = pd.MultiIndex.from_frame(rows[["scene", "vertices"]])
     speedup = own.ms_per_iteration.loc[mesh].to_numpy() / rows.ms_per_iteration
-    curves = rows.groupby(["scene", "method"], sort=False)
-    meshes = curves.vertices.transform("nunique")
+    meshes = rows.groupby(["scene", "method"]).vertices.transform("nunique")
     rows = rows.assign(speedup=speedup, meshes=meshes, exponent=np.nan)
-    for _, curve in curves:
-        if curve.vertices.nunique() >= FEWEST:
-            x, y = np.log(curve[["vertices", "ms_per_iteration"]].to_numpy(float)).T
-            rows.loc[curve.index, "exponent"] = float(np.polyfit(x, y, 1)[0])
+    for _, curve in rows[meshes >= 3].groupby(["scene", "method"]):
+        x, y = np.log(curve[["vertices", "ms_per_iteration"]].to_numpy(float)).T
+        rows.loc[curve.index, "exponent"] = float(np.polyfit(x, y, 1)[0])
     return rows
 
 

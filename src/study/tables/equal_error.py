@@ -90,9 +90,8 @@ def equal_error(
         scene, *_, motion = labels
         vertices, measured = case.vertices.max(), case[case.ms_per_frame.notna()]
         own = case[(case.method == CONVERGED) & (case.vertices == vertices)]
-        full = measured[~measured.method.isin([CONVERGED, PLAYBACK, *REDUCTIONS])].dropna(
-            subset="error_implicit"
-        )
+        full = measured[~measured.method.isin([CONVERGED, PLAYBACK, *REDUCTIONS])]
+        full = full.dropna(subset="error_implicit")
         for model in _fixed(measured) if motion in MOTIONS and len(full) else ():
             row = {name: model[name] for name in equal_error.column_names if name in model}
             row |= {

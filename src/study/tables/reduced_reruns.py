@@ -222,9 +222,8 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
             extents = np.ptp(file["positions"][...], axis=1).max(axis=1)
         ends = {"finite": np.isfinite(extents).all(), "max_extent": extents[1:].max() / extents[0]}
         rows.append({"scene": run["scene"], **ends})
-    return pd.DataFrame(rows).assign(
-        method="full", position_basis="full", energy_ratio=1.0, relative_error=0.0
-    )
+    names = {"method": "full", "position_basis": "full"}
+    return pd.DataFrame(rows).assign(**names, energy_ratio=1.0, relative_error=0.0)
 
 
 @table(

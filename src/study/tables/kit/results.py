@@ -18,7 +18,7 @@ from study.artifact.paths import File
 from study.artifact.reads import Every
 from study.tables.kit.declaration import CONVERGED, Column, integer, number, text
 
-RESAMPLES, SEED, LEVEL = 2000, 1, 0.95
+RESAMPLES, SEED = 2000, 1
 KEYS = ["scene", "group", "method", "position_basis", "k", "r"]  # columns that identify a run
 TRAIN = "train"
 ERROR, DEFORMATION = "relative_error_within_horizon", "deformation_error"
@@ -118,7 +118,7 @@ def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float,
     if len(x) < 2 or np.ptp(x) == 0.0:
         return (float(np.median(x)),) * 3
     found = bootstrap(
-        (x,), np.median, n_resamples=RESAMPLES, confidence_level=LEVEL, method="percentile",
+        (x,), np.median, n_resamples=RESAMPLES, confidence_level=0.95, method="percentile",
         rng=np.random.default_rng(SEED),
     ).confidence_interval  # fmt: skip
     return float(np.median(x)), float(found.low), float(found.high)
