@@ -16,7 +16,7 @@ from study.artifact import paths
 from study.artifact.reads import Every, Setting, TableOf
 from study.experiments.kit.base import ANDERSON, FOM
 from study.tables.kit import declaration, results
-from study.tables.kit.declaration import count, flag, integer, number, shared, table, timed
+from study.tables.kit.declaration import count, flag, integer, number, shared, table, text, timed
 from study.tables.kit.results import DEFORMATION, ERROR, EXPERIMENT, FAILED, Rows
 
 _POINT = [ERROR, "ms_per_frame"]
@@ -137,7 +137,9 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
 @table(
     title="Where reductions pay and where they lose to the full order",
     columns=(
-        results.MEASURE,
+        text(
+            "measure", "errors that have to be within a limit: position, or both (deformation, too)"
+        ),
         *shared("reference position_basis method"),
         count(
             "scenes", "scenes (and groups) with a timed run, whose reference is known well enough"

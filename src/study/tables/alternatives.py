@@ -16,9 +16,8 @@ from study.tables.kit.results import Rows
 
 ITERATIONS = integer("iterations", "iterations of each substep; empty: as many as converge")
 MOTION = text("motion", f"test trajectory, one of: {', '.join(MOTIONS)}")
-# Columns of a test trajectory in a scene; of one setting in it.
-CASE = ["scene", "factor", "stiffness", "motion"]
-KEYS = [*CASE, *settings.SETTING]
+CASE = ["scene", "factor", "stiffness", "motion"]  # columns of a test trajectory in a scene
+KEYS = [*CASE, *settings.SETTING]  # and of a setting in it
 PLAIN, TEN = "projective", 10  # method and iterations that times are compared with
 
 # Makes a column of errors, whose relative difference between machines is larger: rounding errors

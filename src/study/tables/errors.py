@@ -250,10 +250,10 @@ def _steps(
     """Yield each change of method: name, both methods, run pairs; ``square``: from `_square`."""
     for name, methods in STEPS.items():
         yield name, *methods, _pairs(runs, *methods)
-    for name, (before, after) in SQUARE.items():
-        rows = name.startswith("whole elements")
-        chosen = square[square.rows_per_element > 1] if rows else square
-        yield name, before, after, _pairs(chosen, before, after)
+    several = square[square.rows_per_element > 1]
+    for name, methods in SQUARE.items():
+        chosen = several if name.startswith("whole elements") else square
+        yield name, *methods, _pairs(chosen, *methods)
     for name, kind in KINDS.items():
         pairs = pd.concat([_pairs(runs, *two) for two in combinations(kind, 2)])
         ratios = pairs[["gain", "error"]]

@@ -19,8 +19,6 @@ from study.tables.kit import declaration, results
 from study.tables.kit.declaration import flag, number, shared, table, text
 from study.tables.kit.results import Rows
 
-_NAMES = ["scene", "group", "method", "position_basis"]
-
 
 @table(
     title="Reduced runs of the training and the held-out motions",
@@ -142,7 +140,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     # match rows of subspace models by the size k, as their r is the number of sampled elements
     for rows in (runs, reduced):
         rows["size"] = rows.r.where(rows.position_basis == "full", rows.k).astype(float)
-    keys = [*_NAMES, "size"]
+    keys = ["scene", "group", "method", "position_basis", "size"]
     measured = ["ms_per_frame", "vertices_ms", "local_ms", "global_ms", "speedup"]
     return runs.merge(reduced[keys + measured], on=keys, how="left")
 

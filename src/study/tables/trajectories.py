@@ -74,8 +74,7 @@ def error_budget(rows: pd.DataFrame, references: pd.DataFrame) -> pd.DataFrame:
     before = error.shift().where(rows.part != SPAN, 0.0)
     with np.errstate(invalid="ignore"):
         added = (error - before).where(rows.part != FULL_ORDER)
-    trajectory = pd.Series(np.arange(len(rows)) // len(PARTS), rows.index)
-    most = added == added.groupby(trajectory).transform("max")
+    most = added == added.groupby(np.arange(len(rows)) // len(PARTS)).transform("max")
     known = references[["scene", "motion", *results.OWN_ERRORS]]
     rows = rows.assign(added=added).merge(known, "left", ["scene", "motion"])
     least = rows.reference_deformation_error.fillna(rows.reference_error) / results.THIRD

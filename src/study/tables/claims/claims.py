@@ -85,14 +85,14 @@ def outcome(test: TestRule, tables: Tables) -> dict[str, Any]:
         return made | {"measured": "no data", "sentence": f"{test.what}: {why}"}
     spread = _range(values)
     limit = f"{'at least' if test.compare == '>=' else 'at most'} {test.threshold:g}"
-    beside = f"{near} of {total} within a factor {test.factor:g} of it" if near else ""
+    beside = f"{near} of {total} within a factor {test.factor:g} of it"
     sentence = f"{test.what}: {good} of {total} {limit} (measured {spread})"
     if verdict in (DEPENDS, MACHINE):
         made["condition"] = f"{test.what}, {limit}: {_broken_down(test, rows, passed)}"
     if verdict == MACHINE:
         made["condition"] += f" (measured {spread}; {beside}, which decides nothing)"
     ends = {"least": values.min(), "median": np.median(values), "most": values.max()}
-    sentence += f", {beside}" if beside else ""
+    sentence += f", {beside}" if near else ""
     return made | ends | {"measured": spread, "sentence": sentence}
 
 

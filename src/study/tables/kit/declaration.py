@@ -32,7 +32,6 @@ QUANTITIES: dict[Quantity, str] = {
 }
 # Default tolerance of numbers between two machines: absolute for "share", relative for others.
 TOLERANCES: dict[Quantity, float] = {"exact": 1e-8, "value": 1e-4, "error": 0.05, "share": 0.1}
-NUMBER_OF_RUNS_TOLERANCE = 2.0  # of integers of quantity "share", which are numbers of runs
 Kind = Literal["text", "integer", "number", "flag"]
 WORDS: tuple[Kind, ...] = ("text", "flag")  # kinds of columns without numbers
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?inf", re.ASCII | re.IGNORECASE)
@@ -72,7 +71,7 @@ class Column:
     def within(self) -> float:
         """Allowed difference between machines: `tolerance` or a default, 0 but for numbers."""
         if self.kind == "integer" and self.quantity == "share":
-            return NUMBER_OF_RUNS_TOLERANCE
+            return 2.0  # of numbers of runs
         default = TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
         return default if self.tolerance is None else self.tolerance
 

@@ -34,13 +34,9 @@ COLUMNS = (
     ),
     number("playback_error", "median error of playback on these motions, see reduced_reruns"),
 )
-# Held-out motions are left out if the training run differs from theirs by at most this (relative).
-FAR = 0.3
+FAR = 0.3  # relative; held-out motions from which the training run differs less are left out
 EXPERIMENT = ["scene", "group"]
 MEASURES = POSITION, BOTH = "position", "both"
-MEASURE = text(
-    "measure", "errors that have to be within a limit: position, or both (deformation, too)"
-)
 OWN_ERRORS = "reference_error", "reference_deformation_error"
 THIRD = 1.0 / 3.0  # largest error of a reference over a limit by which runs are judged
 ORTHOGONAL = "pod"  # method that evaluates all elements and projects onto the basis orthogonally
