@@ -272,7 +272,8 @@ def _with_costs(
     """Return ``made`` with ``reduction_s`` and errors of the rows with the same ``keys``."""
     found = made.reset_index()
     for source in (pd.concat(seconds).reindex(columns=[*keys, "reduction_s"]), pd.concat(errors)):
-        found = with_whole_sizes(found).merge(with_whole_sizes(source), on=keys, how="left")
+        typed = source if len(source) else source.astype(object)
+        found = with_whole_sizes(found).merge(with_whole_sizes(typed), on=keys, how="left")
     return found.set_index("index")
 
 
