@@ -1,7 +1,7 @@
 # The project with its environment, made by the same script and lock file as without a container:
 #   docker build -t pdrom .
 #   docker run --rm -v pdrom-results:/home/visitor/pdrom/results pdrom --configfile config/tiny.yaml
-#   docker run --rm pdrom test
+#   docker run --rm pdrom test       (downloads the tests' tools)
 FROM python:3.12-slim-bookworm
 
 # a version of git that is pinned here would vanish from Debian's mirrors with its next update

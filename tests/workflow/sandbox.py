@@ -48,7 +48,8 @@ class Sandbox:
     def make(cls, folder: Path) -> "Sandbox":
         copy_repository(folder)
         shutil.copy2(ROOT / "reproduce", folder)
-        shutil.copy2(ROOT / "requirements.lock", folder)
+        for lock in ROOT.glob("requirements*.lock"):
+            shutil.copy2(lock, folder)
         (folder / MICRO_FILE).write_text(yaml.safe_dump(MICRO), encoding="utf-8")
         return cls(folder)._with_environment()
 

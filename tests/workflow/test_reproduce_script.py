@@ -41,6 +41,7 @@ case "$*" in
     ;;
 *"-m pip"*)
     for number in 1 2 3 4 5 6 7 8 9 10 11; do echo "Collecting package$number"; done
+    case "$*" in *requirements-test.lock) mkdir -p ".venv/{packages}/types_PyYAML-6.dist-info" ;; esac
     echo "Installing collected packages: all"
     touch installing
     while [ -e hold ]; do sleep 0.05; done
@@ -69,6 +70,8 @@ class Folder:
             self.programs.joinpath(tool).symlink_to(shutil.which(tool))
         shutil.copy(SCRIPT, self.path)
         self.path.joinpath("requirements.lock").write_text(LOCK_FILE, encoding="utf-8")
+        for name in ("requirements-test.lock", "requirements-cluster.lock"):
+            shutil.copy(ROOT / name, self.path)
 
     def add_python(self, version: str = "3.12", too_old: int = 0, no_venv: int = 0) -> None:
         values = {"version": version, "too_old": too_old, "no_venv": no_venv}
@@ -247,11 +250,12 @@ def test_the_environment_is_made_once_for_each_lock_file(folder):
 
 @pytest.mark.parametrize("change", ["a version", "one more", "one less"])
 def test_packages_that_another_program_changed_are_noticed(change, folder):
-    """Those of the executor for clusters may be added."""
+    """Those of the executor for clusters and the tests' tools may be added."""
     folder.run()
     packages = folder.path / ".venv" / PACKAGES
     installed = packages / "numpy-2.1.0.dist-info"
-    lines = (ROOT / "requirements-cluster.lock").read_text("utf-8").splitlines()
+    locks = (ROOT / f"requirements-{name}.lock" for name in ("cluster", "test"))
+    lines = [line for lock in locks for line in lock.read_text("utf-8").splitlines()]
     for name in [line.partition("==")[0] for line in lines if "==" in line]:
         (packages / f"{name.replace('-', '_')}-1.0.dist-info").mkdir()
     assert folder.run()[1] == []
@@ -266,13 +270,28 @@ def test_packages_that_another_program_changed_are_noticed(change, folder):
     assert why == "reproduce: .venv holds other packages than those of requirements.lock"
 
 
+def test_only_the_tests_add_their_tools_and_only_where_one_is_missing(folder):
+    """Tools that cannot be added leave the environment of the study as it is."""
+    folder.run()
+    folder.touch("pip-fails", "ERROR: no\n")
+    assert folder.run("test")[0] != 0
+    assert folder.run() == (0, [])
+    folder.path.joinpath("pip-fails").unlink()
+    adding = [folder.run("test")[1][:1] for _ in range(2)]
+    (folder.path / ".venv" / PACKAGES / "types_PyYAML-6.dist-info").rmdir()
+    adding += [folder.run()[1], folder.run("test")[1][:1]]
+    added = ["reproduce: adding the tests' tools to .venv (once)"]
+    assert adding == [added, [], [], added]
+
+
 def test_arguments_are_handed_on(folder):
     """The set-up shows that it is alive."""
     asked = (["-n", "results/figures/a b.pdf"], ["test", "-q", "tests/unit"], ["run", "true"], [])
     said = [folder.run(*arguments)[1] for arguments in asked]
     assert folder.calls == [" ".join([FRONT, *arguments]) for arguments in asked]
     assert said[0][1:] == ["reproduce: 10 of 1 packages", "reproduce: unpacking 11 packages"]
-    assert said[1:] == [[], [], []]
+    assert said[1][0].startswith("reproduce: adding the tests' tools")
+    assert said[2:] == [[], []]
 
 
 def test_help_makes_nothing(folder):
