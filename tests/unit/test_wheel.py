@@ -10,6 +10,7 @@ from zipfile import ZipFile
 
 import pytest
 from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from builders import SMALL
 from places import CONFIG, EXAMPLES, ROOT
@@ -56,18 +57,12 @@ class Missing:
 
 sys.meta_path.insert(0, Missing)
 """
-EVERY_MODULE = """from importlib import import_module
-from pkgutil import walk_packages
-import pdrom
-
-print(pdrom.__file__, *(import_module(m.name) and m.name
-    for m in walk_packages(pdrom.__path__, "pdrom.") if "__main__" not in m.name))
+EVERY_MODULE = """import importlib, pkgutil, pdrom
+print(pdrom.__file__)
+for found in pkgutil.walk_packages(pdrom.__path__, "pdrom."):
+    if "__main__" not in found.name:
+        print(importlib.import_module(found.name).__name__)
 """
-
-
-def plain(name: str) -> str:
-    """Name of a distribution as lock files write it."""
-    return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def needed_by(wheel: Path) -> set[str]:
@@ -80,7 +75,7 @@ def needed_by(wheel: Path) -> set[str]:
     while waiting:
         wanted = Requirement(waiting.pop())
         applies = not wanted.marker or wanted.marker.evaluate({"extra": ""})
-        if applies and (name := plain(wanted.name)) not in found:
+        if applies and (name := canonicalize_name(wanted.name)) not in found:
             found.add(name)
             waiting += requires(name) or []
     return found
@@ -105,7 +100,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     missing = {
         module
         for module, owners in packages_distributions().items()
-        if needed.isdisjoint(map(plain, owners))
+        if needed.isdisjoint(map(canonicalize_name, owners))
     } - {"pdrom"}
     text = ONLY_THE_LIBRARY.format(missing=missing)
     (packages / "only_the_library.py").write_text(text, encoding="utf-8")

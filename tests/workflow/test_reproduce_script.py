@@ -41,7 +41,9 @@ case "$*" in
     ;;
 *"-m pip"*)
     for number in 1 2 3 4 5 6 7 8 9 10 11; do echo "Collecting package$number"; done
-    case "$*" in *requirements-test.lock) mkdir -p ".venv/{packages}/types_PyYAML-6.dist-info" ;; esac
+    case "$*" in
+    *requirements-test.lock) mkdir -p ".venv/{packages}/types_PyYAML-6.dist-info" ;;
+    esac
     echo "Installing collected packages: all"
     touch installing
     while [ -e hold ]; do sleep 0.05; done
