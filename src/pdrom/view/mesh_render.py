@@ -131,19 +131,6 @@ def outline_edges(
     return edges[front[first] != front[second]]
 
 
-def draw_lines(ax: Axes, segments: np.ndarray, camera: Camera, colours: np.ndarray) -> None:
-    """Draw ``segments`` (n, 2, 3) m in RGBA ``colours`` (n, 4) on ``ax`` from far to near."""
-    from matplotlib.collections import LineCollection
-
-    order = np.argsort(camera.depth(segments.mean(axis=1)), kind="stable")
-    flat = camera.project(segments.reshape(-1, 3)).reshape(-1, 2, 2)
-    lines = LineCollection(
-        flat[order], colors=colours[order], linewidths=1.2, capstyle="round", zorder=2.0,
-        rasterized=len(segments) > RASTER_ABOVE,
-    )  # fmt: skip
-    ax.add_collection(lines)
-
-
 def set_window(ax: Axes, window: Window) -> None:
     """Show ``window`` on ``ax`` without axes, all directions to the same scale."""
     ax.set(xlim=(window.left, window.right), ylim=(window.bottom, window.top), aspect="equal")

@@ -39,6 +39,11 @@ class RunPanel:
     reference: bool = False
     obstacles: Sequence[Mesh] | None = None
 
+    @property
+    def began(self) -> bool:
+        """Whether there was a run: it is drawn, or has failed."""
+        return self.positions is not None or self.failure is not None
+
     def zoomed(self, window: Window, camera: Camera) -> Window:
         """Return ``window``, enlarged in both directions if ``camera`` sees the run exceed it."""
         flat = None if self.positions is None else camera.project(self.positions)
@@ -131,7 +136,6 @@ def centre_note(ax: Axes, text: str, colour: str = "#666666") -> None:
 HEIGHT_LIMIT = 9.3  # inches, text height of a page
 LEFT = 1.0  # inches, width of the row labels
 ABOVE, LINE, BELOW = 0.19, 0.13, 0.07  # inches: heights of a title, a text line, a gap
-NOTHING_RAN = "not run: the projections are round-off, there is nothing to reduce"
 
 
 @dataclass(frozen=True)

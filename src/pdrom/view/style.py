@@ -1,6 +1,5 @@
 """Common style of all figures: fonts, colours, markers, legends and axis helpers."""
 
-import textwrap
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,7 +11,6 @@ from pdrom.view.artists import Artist, Axes, Figure, Line2D, Patch
 
 WIDTH = 7.0  # inches, text width of the manuscript
 DIGITS = 6  # decimals of the positions of axes, which are fractions of the figure
-NOTE = 100  # characters per line in a figure that contains only text
 
 # Palette of Okabe and Ito (2008), distinguishable with every common colour vision deficiency.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -124,11 +122,3 @@ def log_axis(ax: Axes, low: float, high: float) -> None:
     ax.set(yscale="log", ylim=(low, high))
     ax.yaxis.set_major_locator(LogLocator(base=10.0, numticks=6))
     ax.grid(True)
-
-
-def note(text: str) -> Figure:
-    """A figure that only says in ``text`` why there is nothing to draw."""
-    lines = [line for part in text.split("\n") for line in textwrap.wrap(part, NOTE)]
-    figure = new_figure(0.3 + 0.15 * len(lines), None)
-    figure.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", fontsize=9, color="#444444")
-    return figure

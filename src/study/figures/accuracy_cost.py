@@ -38,75 +38,53 @@ FAMILIES = {
 }
 ITERATIONS, COARSE, PROJECTION, ENTRIES, ELEMENTS, WEIGHTED, INTERPOLATED = FAMILIES
 _BY_ROWS = {"all": PROJECTION, "scalar": ENTRIES, "joint": ENTRIES, "element": ELEMENTS}
-Look = tuple[str | None, str]
-Block = tuple[str, list[Line2D]]
 
 
-def look_of(method: str, position_basis: str, drawn: Drawn) -> Look:
+def look_of(method: str, position_basis: str, drawn: Drawn) -> tuple[str | None, str]:
     """Family of a model (see `FAMILIES`; None if it is not drawn), and its legend entry."""
     if method == FOM:
         return ITERATIONS, "K iterations"
     if method.startswith(COARSER):
         return COARSE, "plain and accelerated"
     if position_basis == "full":
-        held = drawn.reductions.get(method)
-        return _BY_ROWS[held.rows] if held else None, drawn.title(method)
+        known = drawn.reductions.get(method)
+        return _BY_ROWS[known.rows] if known else None, drawn.title(method)
     if method == "full":
         return WEIGHTED, "all projections"
     return (WEIGHTED, "ecsw, by tolerance") if method.startswith("ecsw") else (INTERPOLATED, method)
 
 
-def markers(looks: list[Look]) -> dict[Look, str]:
-    """Mapping of pairs (family, legend entry) to markers, which differ within a family."""
-    found: dict[Look, str] = {}
-    for look in dict.fromkeys(looks):
-        before = sum(family == look[0] for family, _ in found)
-        found[look] = "X" if look[0] == ITERATIONS else MARKERS[before % len(MARKERS)]
-    return found
-
-
 @dataclass(frozen=True)
 class TradeOffs:
-    """Points (error, time) of reduced models in all scenes, with their markers.
+    """Points (error, time) of reduced models in all scenes.
 
     The "own" full-order run of a scene has as many iterations as the scene's configuration sets.
 
-    points : rows of table accuracy_cost; errors are against the converged run
-    blown_up : reduced runs that blew up before an error could be computed
-    own_ms : scene -> time per frame of its own full-order run, ms
-    mesh_error : scene -> error of its mesh relative to the motion, NaN where it is not known
-    marker : (name in `FAMILIES`, legend entry) -> Matplotlib marker
+    points : rows of table accuracy_cost, with ``family`` and ``member`` by `look_of`, and with the
+        ``marker`` of the member; errors are against the converged run
+    blown_up : the same of reduced runs that blew up before an error could be computed
+    own : scene -> row of its own full-order run; mesh_error is NaN where it is not known
     """
 
     points: pd.DataFrame
     blown_up: pd.DataFrame
-    own_ms: dict[str, float]
-    mesh_error: dict[str, float]
-    marker: dict[Look, str]
-
-    def members(self, family: str) -> dict[str, str]:
-        """Return legend entry -> marker for models of a ``family`` (see `FAMILIES`)."""
-        return {name: marker for (own, name), marker in self.marker.items() if own == family}
+    own: pd.DataFrame
 
 
-def trade_offs(
-    drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame
-) -> tuple[TradeOffs, list[str]]:
-    """Return points (error, time) of what ``drawn`` selects, and a list of scenes with points.
+def trade_offs(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> TradeOffs:
+    """Return points (error, time) of what ``drawn`` selects, in scenes that have some.
 
     Raises NothingToDraw if no reduced model has both an error and a time.
     """
     table = table.dropna(subset=[ERROR, TIME])
     own = (table.method == "full") & (table.position_basis == "full")
-    full = table[own].set_index("scene")
-    shown = (table[TIME] > 0.0) & ~own & (table.method != ANDERSON)
-    points = _drawn(table[shown], drawn)
-    blown_up = runs[(runs.blowup_frame >= 0) & runs[ERROR].isna() & (runs[TIME] > 0.0)]
-    scenes = drawn.scenes_of(points, "no reduced model with both an error and a time")
-    points = points[points.scene.isin(scenes)]
-    marker = markers(list(zip(points.family, points.member, strict=True)))
-    own_run = dict(full[TIME]), dict(full.mesh_error)
-    return TradeOffs(points, _drawn(blown_up, drawn), *own_run, marker), scenes
+    points = _drawn(table[(table[TIME] > 0.0) & ~own & (table.method != ANDERSON)], drawn)
+    points = points[points.scene.isin(drawn.scenes_of(points))]
+    number = points.groupby("family").member.transform(lambda names: pd.factorize(names)[0])
+    marker = number.map(lambda i: MARKERS[i % len(MARKERS)]).where(points.family != ITERATIONS, "X")
+    lost = runs[(runs.blowup_frame >= 0) & runs[ERROR].isna() & (runs[TIME] > 0.0)]
+    points = points.assign(number=number, marker=marker)
+    return TradeOffs(points, _drawn(lost, drawn), table[own].set_index("scene"))
 
 
 def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
@@ -125,15 +103,12 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
     """
     ax.set_xscale("log")
     style.log_axis(ax, LOW, HIGH)
-    rows = found.points[found.points.scene == scene]
-    lost = found.blown_up[found.blown_up.scene == scene]
+    rows, lost = (part[part.scene == scene] for part in (found.points, found.blown_up))
     for family, colour in FAMILIES.items():
         part = rows[rows.family == family]
-        for name, marker in found.members(family).items():
-            own = part[part.member == name]
-            hollow = own.position_basis == "skinning"
-            _points(ax, own[~hollow], size, colour, marker=marker)
-            _points(ax, own[hollow], size, colour, marker=marker, fillstyle="none")
+        for (_, hollow), own in part.groupby(["number", part.position_basis == "skinning"]):
+            fill = {"fillstyle": "none"} if hollow else {}
+            _points(ax, own, size, colour, marker=own.marker.iloc[0], **fill)
         front = best_points(part, ERROR)
         heights = np.clip(front[ERROR].to_numpy(float), LOW, HIGH)
         steps = {"linewidth": 1.3, "drawstyle": "steps-post", "zorder": 1.5}
@@ -141,11 +116,11 @@ def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> Non
         ended = lost[lost.family == family][TIME]
         cross = {"markersize": 6.0, "markeredgewidth": 1.8}
         ax.plot(ended, np.full(len(ended), 0.6 * HIGH), BLOWN_UP, color=colour, **cross)
-    times = [*rows[TIME], *lost[TIME], found.own_ms.get(scene, np.nan)]
-    time_axis(ax, np.asarray(times, dtype=float))
-    if scene in found.own_ms:
-        ax.axvline(found.own_ms[scene], zorder=0, **OWN)
-        ax.axhline(found.mesh_error[scene], **MESH_ERROR)
+    run = found.own[found.own.index == scene]
+    time_axis(ax, np.array([*rows[TIME], *lost[TIME], *run[TIME]], dtype=float))
+    for time, error in zip(run[TIME], run.mesh_error, strict=True):
+        ax.axvline(time, zorder=0, **OWN)
+        ax.axhline(error, **MESH_ERROR)
 
 
 def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any) -> None:
@@ -174,17 +149,18 @@ def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
         ax.annotate(f"K = {numbers}", at, (-2.5, -3.5), **look)
 
 
-def handles(found: TradeOffs) -> list[Block]:
+def handles(found: TradeOffs) -> list[tuple[str, list[Line2D]]]:
     """Return blocks of the legend: full-order runs, then the models in ``found`` by `FAMILIES`."""
     common = {"linewidth": 1.0, "markersize": 4.0}
-    entries = [("full order", style.handles({"K iterations": (style.BLACK, "X")}, **common))]
-    entries[0][1].append(style.handle("time with the scene's K", **OWN))
-    entries[0][1].append(style.handle("error of the mesh itself", **MESH_ERROR))
-    for family, colour in FAMILIES.items():
-        looks = {name: (colour, marker) for name, marker in found.members(family).items()}
-        if looks and family != ITERATIONS:
-            entries.append((family, style.handles(looks, **common)))
-    return entries
+    first = style.handles({"K iterations": (style.BLACK, "X")}, **common)
+    first.append(style.handle("time with the scene's K", **OWN))
+    first.append(style.handle("error of the mesh itself", **MESH_ERROR))
+    blocks = [("full order", first)]
+    for family in [*FAMILIES][1:]:
+        members = found.points[found.points.family == family].sort_values("number")
+        looks = {row.member: (FAMILIES[family], row.marker) for row in members.itertuples()}
+        blocks += [(family, style.handles(looks, **common))] if looks else []
+    return blocks
 
 
 @figure(
@@ -205,11 +181,9 @@ def accuracy_cost(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> Figu
     within the family: further down and further left is better. Arrows on the rim are errors outside
     the axis, crosses runs that blew up. Below, a scene for each other constraint group.
     """
-    found, (first, *rest) = trade_offs(drawn, table, runs)
-    groups = {}  # scene -> text that names its reduced groups
-    for scene in (first, *rest):
-        own = [each.group for each in drawn.of(scene)]
-        groups[scene] = style.words(own[0]) if len(own) == 1 else "several groups"
+    found = trade_offs(drawn, table, runs)
+    first, *rest = drawn.scenes_of(found.points)
+    groups = {scene: drawn.groups_of(scene) for scene in (first, *rest)}
     small = list({groups[scene]: scene for scene in reversed(rest)}.values())[::-1]
     blocks = handles(found)
     rows = [blocks[i : i + COLUMNS] for i in range(0, len(blocks), COLUMNS)]
@@ -270,7 +244,7 @@ def alternatives(table: pd.DataFrame) -> Figure:
     cases = table.groupby(["scene", "factor", "stiffness"])
     cases = [(labels, case) for labels, case in cases if case.time_ratio.notna().any()]
     if not cases:
-        raise NothingToDraw("no alternatives")
+        raise NothingToDraw
     beside = -(-len(cases) // rows_of(len(cases), BESIDE))
     figure, axes = small_multiples(len(cases), beside, legend_rows=3, height=1.9)
     for (labels, case), ax in zip(cases, axes, strict=True):

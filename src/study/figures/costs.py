@@ -1,4 +1,4 @@
-"""Figures of the cost of a run: by phase, effect and mesh size, and of reduced local steps."""
+"""Figures of the cost of a run: by phase and mesh size, and of reduced local steps."""
 
 import numpy as np
 import pandas as pd
@@ -6,10 +6,9 @@ import pandas as pd
 from pdrom.view import style
 from pdrom.view.artists import Artist, Axes, Figure
 from study.artifact.reads import TableOf
-from study.experiments.kit.base import GLOBAL, REST, RIGHT
-from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, figure, method_styles
+from study.experiments.kit.base import REST
+from study.figures.kit.declaration import GROUPS, MESHES, Drawn, figure, held, method_styles
 from study.figures.kit.multiples import label_outer, label_rows, plain_ticks, small_multiples
-from study.tables.effects_cost import NOTHING
 
 # Phases of a frame: (label, colour). The first two form the local step, whose share is printed.
 PHASES = {
@@ -31,13 +30,6 @@ NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}
 SCALED = {"fom": (style.BLACK, "o"), "ecsw": ("#1B6E6E", ">")}
 ROOM = 2.6  # the axis ends at this multiple of the largest mesh size, to leave space for text
 COLUMNS = 3  # panels in a row of figure `break_even`
-UNLISTED = "forces, holds, contacts"
-COLOURS = {UNLISTED: style.VERMILLION, RIGHT: style.SKY, GLOBAL: "#3A5A78", REST: "#C9C4BA"}
-TICK = {"linestyle": "none", "marker": "|", "markersize": 9, "markeredgewidth": 1.4}
-ACTING = (
-    "cloth_all_oop spring_oop bend_curved strain_oop strain_poke_twin spring_twist_twin "
-    f"strain_twist_twin cloth_all cloth_all_twin bar_release bar_twist {MESHES}"
-)
 
 
 @figure(
@@ -53,7 +45,7 @@ def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
     bar stands the time per frame. An interpreted loop confirms the claim everywhere, compiled code
     only where projections are expensive.
     """
-    scenes = drawn.scenes_of(table, "no timings")
+    scenes = drawn.scenes_of(table)
     present = set(table[table.scene.isin(scenes)].implementation)
     implementations = [i for i in TITLES if i in present]
     figure = style.new_figure(0.27 * len(scenes) + 1.35)
@@ -77,7 +69,8 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
         times = np.nan_to_num(rows.loc[scene, [*PHASES][:-1]].to_numpy(float))
         total = float(rows.ms_per_frame[scene])
         shares = 100.0 * np.array([*times, total - times.sum()]) / total
-        _draw_bar(ax, y, shares, [colour for _, colour in PHASES.values()])
+        colours = [colour for _, colour in PHASES.values()]
+        ax.barh([y] * 4, shares, left=np.cumsum(shares) - shares, color=colours, height=0.72)
         printed = f"{100.0 * rows.local_share[scene]:.0f} %"
         ax.text(2.0, y, printed, va="center", ha="left", fontsize=7.5, fontweight="bold")
         words = f"{total:.2g} ms" if total < 99.5 else f"{total:.0f} ms"
@@ -85,11 +78,6 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
     ax.axvline(CLAIM, color=style.BLACK, linewidth=1.0, linestyle="--")
     ax.set(xlim=(0, 100), xticks=[0, 25, 50, 75, 100])
     ax.tick_params(axis="y", length=0)
-
-
-def _draw_bar(ax: Axes, y: float, parts: np.ndarray, colours: list[str]) -> None:
-    ends = np.cumsum(parts)
-    ax.barh(np.full(len(parts), y), parts, left=ends - parts, color=colours, height=0.72)
 
 
 @figure(
@@ -102,7 +90,7 @@ def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
     the positions of all vertices as a line of its own. Beside the ends of curves stands the
     exponent of a fitted power law, where there are three sizes of the mesh or more.
     """
-    scenes = drawn.scenes_of(table, "no mesh sizes")
+    scenes = drawn.scenes_of(table)
     figure, looks = style.new_figure(2.9), method_styles({*table.method}) | SCALED
     times = figure.subplots(1, len(scenes), sharex=True, sharey=True, squeeze=False)[0]
     for ax, scene in zip(times, scenes, strict=True):
@@ -147,13 +135,10 @@ def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
     the full-order run. Above the dashed line the reduction costs more than all projections. Lines
     end at the numerical rank.
     """
-    table = drawn.rows(table)
-    table = table[table.factor == 1.0]
-    if table.empty:
-        raise NothingToDraw("no reduced local step was timed")
-    groups = [g for g in drawn.looks if (table.group == g).any()]
+    table = held(drawn.rows(table).query("factor == 1.0"))
+    groups = [group for group in GROUPS if (table.group == group).any()]
     figure, axes = small_multiples(len(groups), COLUMNS, legend_rows=2, height=1.8)
-    styles = method_styles([m for m in drawn.methods if (table.method == m).any()])
+    styles = drawn.styles(table)
     for ax, group in zip(axes, groups, strict=True):
         ax.set(title=style.words(group), yscale="log")
         ax.grid(True)
@@ -169,59 +154,3 @@ def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
     one = style.handle("break-even", color=style.BLACK, linestyle="--")
     style.legend(figure, [*drawn.handles(styles), one], 3)
     return figure
-
-
-@figure(
-    title="What each effect costs", reads={"table": TableOf("effects_cost")}, scenes=ACTING,
-    timed=True,
-)  # fmt: skip
-def effects_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Left: share of each effect in the time of a full-order frame, which is printed beside the
-    bar. Right: the frame of one scene built without some of its effects; the tick is the whole less
-    what these effects cost in it. A bar that ends at the tick pays nothing for what the scene does
-    not list.
-    """
-    costs, removed = table.dropna(subset=["share"]), table.dropna(subset=["without_ms"])
-    removed = removed.sort_values("effect", key=lambda name: name != NOTHING, kind="stable")
-    scenes = drawn.scenes_of(costs, "no timings of effects")
-    several = [scene for scene in scenes if (removed.scene == scene).any()]
-    rows = removed[removed.scene == several[0]] if several else removed[:0]
-    figure = style.new_figure(0.27 * max(len(scenes), len(rows)) + 1.3)
-    axes = figure.subplots(1, 2 if several else 1, squeeze=False)[0]
-    colours = {group: colour for group, (colour, _) in drawn.looks.items()} | COLOURS
-    parts = _draw_scenes(axes[0], costs, scenes, colours)
-    handles: list = [style.patch(style.words(part), color=colours[part]) for part in parts]
-    if several:
-        _draw_left_out(axes[1], rows, several[0])
-        handles.append(style.handle("whole less its own cost", color=style.BLACK, **TICK))
-    style.legend(figure, handles, 4)
-    return figure
-
-
-def _draw_scenes(
-    ax: Axes, costs: pd.DataFrame, scenes: list[str], colours: dict[str, str]
-) -> list[str]:
-    """Draw a frame's time per scene as a bar of parts (effects, phases); return names of parts."""
-    costs = costs.assign(part=costs.effect.where(costs.effect.isin(list(colours)), UNLISTED))
-    parts = [part for part in colours if (costs.part == part).any()]
-    for y, scene in enumerate(scenes):
-        rows = costs[costs.scene == scene]
-        shares = 100.0 * rows.groupby("part").share.sum().reindex(parts, fill_value=0.0)
-        _draw_bar(ax, y, shares.clip(lower=0.0).to_numpy(), [colours[part] for part in parts])
-        total = rows.ms_per_frame.sum()
-        ax.text(101.0, y, f"{total:.2g} ms", va="center", ha="left", fontsize=7)
-    label_rows(ax, scenes)
-    ax.set(xlim=(0, 100), xlabel="share of a full-order frame (%)", ylabel="scene")
-    return parts
-
-
-def _draw_left_out(ax: Axes, rows: pd.DataFrame, scene: str) -> None:
-    whole = float(rows.without_ms.iloc[0])
-    shades = {1: "#BFD3E0", 2: "#8FB2C9", 3: "#5F90B2"}
-    for y, row in enumerate(rows.itertuples()):
-        ax.barh(y, row.without_ms, color=shades.get(row.groups, "#5F90B2"), height=0.72)
-        if row.ms_per_frame > 0.0:
-            ax.plot([whole - row.ms_per_frame], [y], color=style.BLACK, **TICK)
-    label_rows(ax, [f"without {e}" if e != NOTHING else "whole" for e in rows.effect])
-    ax.set(xlim=(0.0, 1.15 * float(rows.without_ms.max())), xlabel="time per frame (ms)")
-    ax.set_title(style.words(scene))

@@ -7,7 +7,7 @@ from pdrom.model.held_out import MOTIONS
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import TableOf
-from study.figures.kit.declaration import NothingToDraw, figure
+from study.figures.kit.declaration import figure, held
 from study.figures.kit.multiples import plain_ticks
 
 MESH = ["vertices", "scene", "factor", "stiffness"]  # columns that name a mesh, by its size
@@ -39,9 +39,7 @@ def equal_error(table: pd.DataFrame) -> Figure:
     scenes known; iterations beyond ten on coarser meshes were added after one, and Chebyshev's
     fixed rate was set on these scenes. $\times 100$: stiffer weights; *: with recorded rows.
     """
-    table = table.dropna(subset=[f"{name}_speedup" for name in AGAINST]).sort_values(MESH)
-    if table.empty:
-        raise NothingToDraw("no reduced model with both an error and a time")
+    table = held(table.dropna(subset=[f"{name}_speedup" for name in AGAINST]).sort_values(MESH))
     table = table.assign(place=table.groupby(MESH).ngroup())  # x of the mesh
     settings = list(table.groupby(["method", "training_motions"]))
     figure = style.new_figure(1.25 * len(settings) + 1.5)

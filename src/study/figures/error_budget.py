@@ -33,7 +33,7 @@ def error_budget(drawn: Drawn, table: pd.DataFrame) -> Figure:
     their limits.
     """
     table = table[table.skinning == 0]
-    scenes = drawn.scenes_of(table, "no error budget")
+    scenes = drawn.scenes_of(table)
     figure = style.new_figure(0.18 * len(scenes) + 1.1)
     axes = figure.subplots(1, len(ERRORS), sharey=True, squeeze=False)[0]
     for ax, (column, label) in zip(axes, ERRORS.items(), strict=True):

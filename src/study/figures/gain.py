@@ -13,8 +13,7 @@ from pdrom.core.store import read_table
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
 from study.artifact.reads import ProjectFile, TableOf
-from study.figures.kit import declaration
-from study.figures.kit.declaration import MESHES, Drawn, Experiment, NothingToDraw, figure
+from study.figures.kit.declaration import GROUPS, MESHES, Drawn, Experiment, figure, held
 from study.figures.kit.multiples import label_outer, small_multiples
 from study.tables.kit.results import FAILED, judged_runs
 
@@ -40,8 +39,6 @@ def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
     of the gain.
     """
     runs = drawn.rows(judged_runs(tables["reruns"], tables["errors"]))
-    if runs.empty:
-        raise NothingToDraw("no run with a gain")
     figure = style.new_figure(3.0)
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
     names = [*_KEYS, *(f"{q}_{e}" for q in ("gain", "error") for e in ENDS)]
@@ -49,11 +46,10 @@ def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
     if len(repeated := tables["repetitions"]):
         repeated = repeated[repeated.varied == "training"]
         ranges = runs[[*_KEYS, "gain", "error"]].merge(repeated, on=_KEYS)
-    methods = [m for m in drawn.methods if (runs.method == m).any()]
-    styles = declaration.method_styles(methods)
-    for method in methods:
+    styles = drawn.styles(runs)
+    for method, look in styles.items():
         own = runs[runs.method == method]
-        _draw_method(left, own, ranges[ranges.method == method], *styles[method])
+        _draw_method(left, own, ranges[ranges.method == method], *look)
     style.log_axis(left, *ERRORS)
     left.set(xscale="log", xlim=GAINS, xlabel="gain of the interpolation")
     left.set_ylabel("error within the horizon (relative)")
@@ -115,10 +111,8 @@ def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
     that are trained on as many resampled frames, on some scenes; pale ones that over choices of the
     arbitrary signs of the singular vectors.
     """
-    table = table[table.scene.isin(drawn.scenes)]
-    table = table[table.gain.notna() & (table.direction != "square")]
-    if table.empty:
-        raise NothingToDraw("no scene that climbs the ladder")
+    shown = table.scene.isin(drawn.scenes) & table.gain.notna() & (table.direction != "square")
+    table = held(table[shown])
     climbed = table[table.direction.isin(["up", "down"])]
     rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
     figure = style.new_figure(0.2 * len(rungs) + 1.2)
@@ -189,18 +183,14 @@ def _panels(
     drawn: Drawn, table: pd.DataFrame, limits: tuple[float, float], columns: int, legend: int
 ) -> tuple[Figure, list[Panel]]:
     """Figure with a panel for each scene and group in ``table``, and ``legend`` lines below."""
-    pairs = [
-        (each, rows)
-        for each in drawn.experiments
-        if len(rows := table[(table.scene == each.scene) & (table.group == each.group)])
-    ]
-    if not pairs:
-        raise NothingToDraw("no experiment")
-    figure, axes = small_multiples(len(pairs), columns, legend_rows=legend)
-    for ax, (each, _) in zip(axes, pairs, strict=True):
+    rows = dict([*held(table[table.scene.isin(drawn.scenes)]).groupby(["scene", "group"])])
+    shown = [each for each in drawn.experiments if (each.scene, each.group) in rows]
+    figure, axes = small_multiples(len(shown), columns, legend_rows=legend)
+    for ax, each in zip(axes, shown, strict=True):
         style.log_axis(ax, *limits)
         ax.set_title(each.title)
-    return figure, [(ax, *pair) for ax, pair in zip(axes, pairs, strict=True)]
+    found = [rows[each.scene, each.group] for each in shown]
+    return figure, list(zip(axes, shown, found, strict=True))
 
 
 def _published(path: Path, columns: list[str], each: Experiment) -> pd.DataFrame:
@@ -233,10 +223,9 @@ def singular_values(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figur
             reference = True
             shown = np.clip(values / values[0], VALUES[0], None)
             ax.plot(np.arange(1, len(values) + 1), shown, color=PUBLISHED, linewidth=0.9, zorder=1)
-        _draw_values(ax, rows.sort_values("component"), *drawn.looks[each.group])
+        _draw_values(ax, rows.sort_values("component"), *GROUPS[each.group])
     label_outer([ax for ax, *_ in panels], 4, "component", "singular value / first")
-    groups = dict.fromkeys(each.group for _, each, _ in panels)
-    handles = style.handles({style.words(group): drawn.looks[group] for group in groups})
+    handles = style.handles({style.words(e.group): GROUPS[e.group] for _, e, _ in panels})
     handles.append(style.handle("below round-off", linestyle="none", marker="o", **HOLLOW))
     if reference:
         handles.append(style.handle("published code's output", color=PUBLISHED))
@@ -277,9 +266,7 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
     snapshots used (train), the frames between them (test) and another run (held out). Errors above
     the axis are drawn on its rim with an arrow head.
     """
-    methods = [m for m in drawn.methods if (table.method == m).any()]
-    if not methods:
-        raise NothingToDraw("no reconstruction errors")
+    styles = drawn.styles(table)
     figure, panels = _panels(drawn, table, SHOWN, 3, legend=3)
     reference = False
     for ax, each, rows in panels:
@@ -290,14 +277,14 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
             reference = True
             error = np.clip(output[f"relative_error_{axis}"].to_numpy(float), *SHOWN)
             ax.plot(output.num_points, error, color=PUBLISHED, linewidth=0.7, zorder=1)
-        lines = [_draw_errors(ax, rows[rows.method == m], m) for m in methods]
+        lines = [_draw_errors(ax, rows[rows.method == m], *styles[m]) for m in styles]
         if not any(lines):
             words = "projections are round-off:\nno relative error exists"
             look = {"ha": "center", "va": "center", "color": "#666666", "transform": ax.transAxes}
             ax.text(0.5, 0.5, words, bbox={"fc": "white", "ec": "none", "pad": 2}, **look)
         ax.set_xlim(0, max(float(rows.r.max()), 1.0) * 1.02)
     label_outer([ax for ax, *_ in panels], 3, "basis size r", "relative error")
-    handles = drawn.handles(declaration.method_styles(methods))
+    handles = drawn.handles(styles)
     handles += [style.handle(words, color="#555555", linestyle=s) for words, s in SPLITS.values()]
     if reference:
         label = "published code's output (x, y)"
@@ -306,9 +293,8 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
     return figure
 
 
-def _draw_errors(ax: Axes, rows: pd.DataFrame, method: str) -> bool:
-    """Draw errors of ``method``, as arrows if too large for the axis; return if any is finite."""
-    colour, marker = declaration.method_styles([method])[method]
+def _draw_errors(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> bool:
+    """Draw errors of a method, as arrows if too large for the axis; return if any is finite."""
     drawn = False
     for split, (_, dashes) in SPLITS.items():
         line = rows[rows.split == split].sort_values("r")

@@ -13,11 +13,11 @@ from pdrom.view import panels as view
 from pdrom.view import style
 from pdrom.view.artists import Figure, ScalarMappable
 from pdrom.view.camera import Camera, obstacles
-from pdrom.view.panels import NOTHING_RAN, Row, RunPanel
+from pdrom.view.panels import Row, RunPanel
 from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, SUBSPACES, TRAIN, File
 from study.artifact.reads import EachOf, Every, Read, TableOf
 from study.experiments.kit.base import Horizon
-from study.figures.kit.declaration import Drawn, Experiment, NothingToDraw, camera_of, figure
+from study.figures.kit.declaration import GROUPS, Drawn, Experiment, camera_of, figure
 from study.figures.kit.elements import magnitudes
 from study.figures.kit.read import choose_ranks, positions_at, rerun_infos
 from study.figures.sensitivity_floor import FLOORS, floors_of
@@ -25,6 +25,7 @@ from study.tables.errors import VOLUMES
 from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
+NOTHING_RAN = "not run: the projections are round-off, there is nothing to reduce"
 WRONG = 0.1  # a run has failed if its relative error exceeds this, or if it blew up
 DISTANCES = (1e-4, 1.0)  # limits of colours: distance from full order / longest side of mesh
 FOOTER = 0.55  # height of the colour scale, inches
@@ -35,9 +36,9 @@ PAIR = "deim-joint block-deim"
 RANKS: Ranks = (6, 10, 20, "full")  # basis sizes; full stands for the numerical rank
 Files = list[File]
 RUNS: dict[str, Read] = {
-    "meshes": EachOf(MESH, "experiments"),
-    "full_order": EachOf(TRAIN, "experiments"),
-    "reruns": EachOf(RERUNS, "runs"),
+    "meshes": EachOf(MESH, "drawn.experiments"),
+    "full_order": EachOf(TRAIN, "drawn.experiments"),
+    "reruns": EachOf(RERUNS, "drawn.runs"),
     **FLOORS,
 }
 COMPARED = """full order against reduced projections, by basis size. The grey outline is the
@@ -64,14 +65,16 @@ class Shown:
     colour: tuple[float, float, float]
     bodies: list[Mesh] | None
 
-    def row(
-        self, label: str, panels: list[RunPanel], seen: list[RunPanel], note: str | None = None
-    ) -> Row:
+    def row(self, label: str, panels: list[RunPanel], seen: list[RunPanel]) -> Row:
         """Return a row of pictures: the full-order run, then ``panels``.
 
         The title of the row is that of the experiment, with ``label`` below. The pictures show what
-        contains the full-order run and the panels ``seen``; ``note`` stands to the right of them.
+        contains the full-order run and the panels ``seen``. If none of these runs could start, as
+        each basis size exceeds the rank, a note says so in place of empty panels.
         """
+        note = None
+        if not any(panel.began for panel in seen):
+            note, panels = NOTHING_RAN, [panel for panel in panels if panel.began]
         window = view.shared_window(self.camera, self.full[0], seen)
         first = RunPanel("full order", style.FULL_ORDER, self.full[0], reference=True)
         panels = [replace(panel, obstacles=self.bodies) for panel in (first, *panels)]
@@ -93,10 +96,6 @@ class Runs:
     reruns: Files
     sensitivity: Files
 
-    def __post_init__(self) -> None:
-        if not self.drawn.experiments or not self.drawn.methods:
-            raise NothingToDraw("no reduced run")
-
     @cached_property
     def ends(self) -> dict[str, int | None]:
         """Horizon of each scene; None if it lies beyond the run."""
@@ -105,16 +104,16 @@ class Runs:
 
     def shown(self, experiment: Experiment) -> Shown:
         """Return the scene of ``experiment`` at the last of the instants."""
-        (frame,), full = positions_at(experiment.path(self.full_order), self.frames[-1:])
+        (frame,), full = positions_at(experiment.find(self.full_order), self.frames[-1:])
         end = self.ends[experiment.scene]
         return Shown(
             experiment,
-            load_mesh(experiment.path(self.meshes)),
+            load_mesh(experiment.find(self.meshes)),
             camera_of(experiment),
             frame,
             f"frame {frame}" if end is None or frame <= end else f"frame {frame}\npast horizon",
             full,
-            style.surface_colour(self.drawn.looks[experiment.group][0]),
+            style.surface_colour(GROUPS[experiment.group][0]),
             obstacles_of(experiment, full),
         )
 
@@ -122,7 +121,7 @@ class Runs:
         """Return method -> panels of its reduced runs, for the basis sizes `ranks`."""
         found = {}
         for method in self.drawn.methods:
-            path = shown.experiment.path(self.reruns, method=method)
+            path = shown.experiment.find(self.reruns, method=method)
             infos = choose_ranks(rerun_infos(path), self.ranks)
             found[method] = [info.panel(shown.frame, shown.colour) for info in infos]
         return found
@@ -131,22 +130,16 @@ class Runs:
         """Return a row for each method, or one row with a note if no reduced run could start."""
         shown = self.shown(experiment)
         reduced = self.reduced(shown)
-        everything = [panel for panels in reduced.values() for panel in panels]
-        if nothing_ran(everything):
-            return [shown.row(f"any method\n{shown.when}", [], everything, NOTHING_RAN)]
-        return [
-            shown.row(f"{self.drawn.title(method)}\n{shown.when}", panels, everything)
+        seen = [panel for panels in reduced.values() for panel in panels]
+        rows = [
+            shown.row(f"{self.drawn.title(method)}\n{shown.when}", panels, seen)
             for method, panels in reduced.items()
         ]
+        return [shown.row(f"any method\n{shown.when}", [], seen)] if rows[0].note else rows
 
     def draw(self) -> Figure:
         """Draw a row for each scene and method: the full-order run, then reduced runs by size."""
         return view.draw_rows([row for each in self.drawn.experiments for row in self.rows(each)])
-
-
-def nothing_ran(panels: list[RunPanel]) -> bool:
-    """Return whether no run in ``panels`` could start: each basis size exceeds the rank."""
-    return all(panel.positions is None and not panel.failure for panel in panels)
 
 
 def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
@@ -202,7 +195,7 @@ def bending_runs(drawn: Drawn, horizon: Horizon, noise: pd.DataFrame, **files: F
     runs, rows = Runs(drawn, horizon, RANKS, (0.6,), **files), []
     for each in drawn.experiments:
         found, path = runs.rows(each), each.find(noise_runs)
-        if found[0].note == NOTHING_RAN and path is not None:
+        if found[0].note and path:
             own = noise[(noise.scene == each.scene) & (noise.group == each.group)]
             found = noise_rows(drawn, runs.shown(each), own, path) or found
         rows += found
@@ -216,30 +209,25 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
     numbers agree at every basis size share a row, with pictures of the first of these kinds.
     """
     shown, rows = replace(shown, bodies=None), []
+    table = table[table.r <= table["rank"]]
+    table = table.assign(failed=~(table.relative_error <= WRONG))
     for method in drawn.methods:
-        for counts, kinds in _alike(table[table.method == method]).items():
-            fail = dict(counts)
+        alike: dict[tuple[tuple[int, str], ...], list[str]] = {}  # text for each size -> kinds
+        for kind, own in table[table.method == method].groupby("noisy_axes", sort=False):
+            sizes = own.groupby("r").failed
+            counts = ((int(r), f"{one.sum()} of {len(one)} starts fail") for r, one in sizes)
+            alike.setdefault(tuple(counts), []).append(str(kind))
+        for texts, kinds in alike.items():
+            remarks = dict(texts)
             panels = [
-                replace(info.panel(shown.frame, shown.colour), remark=fail[info.r])
+                replace(info.panel(shown.frame, shown.colour), remark=remarks[info.r])
                 for info in rerun_infos(path, f"{kinds[0]}/{method}")
-                if info.r in fail
+                if info.r in remarks
             ]
             start = ", ".join(NOISY[kind] for kind in kinds)
             label = f"{drawn.title(method)}\nnoise: {start}\n{shown.when}"
             rows.append(shown.row(label, panels, panels))
     return rows
-
-
-def _alike(table: pd.DataFrame) -> dict[tuple[tuple[int, str], ...], list[str]]:
-    """Map ((r, number of failed runs as text), ...) to the kinds of noise with these numbers."""
-    table = table[table.r <= table["rank"]]
-    failed = ~(table.relative_error <= WRONG)
-    kinds: dict[tuple[tuple[int, str], ...], list[str]] = {}
-    for kind, of_kind in failed.groupby(table.noisy_axes, sort=False):
-        sizes = of_kind.groupby(table.r)
-        counts = ((int(r), f"{one.sum()} of {len(one)} starts fail") for r, one in sizes)
-        kinds.setdefault(tuple(counts), []).append(str(kind))
-    return kinds
 
 
 @figure(
@@ -257,8 +245,8 @@ def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     # instants as fractions of the horizon
     runs = Runs(drawn, horizon, (20, 10, "full"), (0.5, 0.75, 1.0), **files)
     one = drawn.experiments[0]
-    mesh, camera = load_mesh(one.path(runs.meshes)), camera_of(one)
-    frames, full = positions_at(one.path(runs.full_order), runs.frames, runs.ends[one.scene])
+    mesh, camera = load_mesh(one.find(runs.meshes)), camera_of(one)
+    frames, full = positions_at(one.find(runs.full_order), runs.frames, runs.ends[one.scene])
     first = [
         RunPanel(f"frame {f}", style.FULL_ORDER, q, reference=True)
         for f, q in zip(frames, full, strict=True)
@@ -274,7 +262,7 @@ def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     rows = [row("full order", first * len(drawn.methods), None)]
     for each in drawn.of(one.scene):
         reduced = [
-            _over_time(each.path(runs.reruns, method=m), runs, drawn.title(m), frames, full, mesh)
+            _over_time(each.find(runs.reruns, method=m), runs, drawn.title(m), frames, full, mesh)
             for m in drawn.methods
         ]
         blank = [RunPanel("", style.GREY, None, remark="not run")] * len(frames)
@@ -342,29 +330,24 @@ def teaser(drawn: Drawn, horizon: Horizon, errors: pd.DataFrame, **files: Files)
     )
 
 
-def _teaser_row(
-    runs: Runs, experiment: Experiment, errors: pd.DataFrame, subspace: str | None
-) -> Row:
+def _teaser_row(runs: Runs, experiment: Experiment, errors: pd.DataFrame, subspace: str) -> Row:
     """Return a row with the full-order run and the reduced runs of ``experiment``.
 
-    ``errors`` is of the training motion; ``subspace`` has the runs in position subspaces, if any.
+    ``errors`` is of the training motion; ``subspace`` has the runs in position subspaces, or is "".
     """
     shown, panels = runs.shown(experiment), []
     reduced = runs.reduced(shown)
-    everything = [panel for found in reduced.values() for panel in found]
     errors = errors[errors.scene == experiment.scene]
-    ran = not nothing_ran(everything)
-    for method, found in reduced.items() if ran else ():
-        own = errors[(errors.group == experiment.group) & (errors.method == method)]
-        drawn = [panel for panel in found if panel.positions is not None]
-        sizes = (drawn or found)[-len(runs.ranks) :]
-        own = own[own.position_basis == "full"]
-        panels += [_with_error(panel, method, own, "r") for panel in sizes]
+    own = errors[(errors.group == experiment.group) & (errors.position_basis == "full")]
+    for method, found in reduced.items():
+        drawn = [panel for panel in found if panel.positions is not None] or found
+        rows = own[own.method == method]
+        panels += [_with_error(each, method, rows, "r") for each in drawn[-len(runs.ranks) :]]
     if sampled := subspace and _subspace(shown.frame, subspace):
         own = errors[(errors.position_basis == "pod") & (errors.method == TOLERANCE)]
         panels.append(_with_error(sampled, "ecsw", own, "k"))
-    label = shown.when.splitlines()[-1]
-    return shown.row(label, panels, everything, None if ran else NOTHING_RAN)
+    seen = [panel for found in reduced.values() for panel in found]
+    return shown.row(shown.when.splitlines()[-1], panels, seen)
 
 
 def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> RunPanel:

@@ -17,7 +17,6 @@ from pdrom.view.mesh_render import draw_surface, set_window
 from pdrom.view.panels import fit_aspect
 from study.artifact.paths import BASIS, MESH, SAMPLING, SNAPSHOTS, TRAIN, File
 from study.artifact.reads import EachOf
-from study.figures.kit import declaration
 from study.figures.kit import elements as shapes
 from study.figures.kit.declaration import MESHES, Drawn, NothingToDraw, camera_of, figure
 from study.figures.kit.multiples import panels, rows_of
@@ -36,13 +35,11 @@ ROW_HEIGHT = 1.85  # height of a row of panels, inches
 
 @dataclass(frozen=True)
 class Iteration:
-    """Step k of a greedy selection of samples.
+    """Step k of DEIM.
 
-    magnitude : (e,) size of mode k's residual on each element; the selection takes the largest. It
-        is the largest entry of the element (``rows`` "scalar"), the largest norm of a row of x, y
-        and z ("joint"), or the norm of all entries of the element ("element")
-    earlier, newest : indices of the elements chosen in earlier steps, and in this step
-    entry : index, in the vector of the mode, of the first entry chosen in this step
+    magnitude : (e,) largest absolute entry of mode k's residual on each element
+    earlier, newest : indices of the elements with the entries chosen in earlier steps, in this step
+    entry : index, in the vector of the mode, of the entry chosen in this step
     """
 
     k: int
@@ -55,9 +52,9 @@ class Iteration:
 @figure(
     number=2, title="The first iterations of DEIM",
     reads={
-        "meshes": EachOf(MESH, "first_run"), "bases": EachOf(BASIS, "first_run"),
-        "samples": EachOf(SAMPLING, "first_run"),
-    }, scenes=SCENES, methods="deim block-deim deim-joint",
+        "meshes": EachOf(MESH, "drawn.first_run"), "bases": EachOf(BASIS, "drawn.first_run"),
+        "samples": EachOf(SAMPLING, "drawn.first_run"),
+    }, scenes=SCENES, methods="deim",
 )  # fmt: skip
 def deim_iterations(
     drawn: Drawn, meshes: list[File], bases: list[File], samples: list[File]
@@ -68,15 +65,12 @@ def deim_iterations(
     entry, is the darkest; white dots are elements picked before. Each step asks for one number,
     whose whole element has to be projected for it.
     """
-    method, reduction = next(iter(drawn.reductions.items()), ("", None))
-    if not samples or reduction is None or reduction.rows == "all":
-        raise NothingToDraw("no samples")
-    experiment, path = drawn.experiments[0], samples[0].path
+    experiment, method, path = drawn.experiments[0], drawn.methods[0], samples[0].path
     basis, samplings = load_basis(bases[0].path), read_samplings(path)
-    if not samplings:
-        raise NothingToDraw(f"nothing was sampled for {experiment.title}")
+    if not samplings or drawn.reductions[method].rows != "scalar":
+        raise NothingToDraw
     entries, camera = samplings[max(samplings)].entries, camera_of(experiment, 45.0)
-    steps = iterations(basis.V, entries, basis.rows_per_element, reduction.rows, STEPS)
+    steps = iterations(basis.V, entries, basis.rows_per_element, STEPS)
     mesh = load_mesh(meshes[0].path)
     elements = shapes.element_map(experiment.group, mesh, basis.elements, source=str(path))
     columns = min(COLUMNS, len(steps))
@@ -104,49 +98,37 @@ def deim_iterations(
 
 
 def iterations(
-    V: np.ndarray, entries: np.ndarray, rows_per_element: int, rows: str, count: int
+    V: np.ndarray, entries: np.ndarray, rows_per_element: int, count: int
 ) -> list[Iteration]:
-    """First ``count`` steps of a greedy selection, recomputed from the selected entries.
+    """First ``count`` steps of DEIM, recomputed from the selected entries.
 
     The residual of step k is v_k - V_{k-1} c: mode v_k minus its interpolation by the earlier modes
-    V_{k-1}, with coefficients c from the equations at the samples so far (Chaturantabut and
-    Sorensen 2010, algorithm 1). The next sample is taken at the largest residual. Raises
-    StorageError if an entry lies outside the basis, or if there are too few entries for one step.
+    V_{k-1}, with coefficients c from the equations at the entries so far (Chaturantabut and
+    Sorensen 2010, algorithm 1). The next entry is taken where the residual is largest. Raises
+    StorageError if there is no entry, or if one lies outside the basis.
 
     V : (3 e p, rank) modes of e elements with p = ``rows_per_element``
-    entries : row indices of V in the order of selection: one per step for ``rows`` "scalar" and
-        "joint" (the x entry stands for x, y and z of a row), 3 p per step for "element"
+    entries : row indices of V in the order of selection, one per step
     """
-    per_step = 3 * rows_per_element if rows == "element" else 1
-    if len(entries) < per_step or entries.min() < 0 or entries.max() >= len(V):
+    if not len(entries) or entries.min() < 0 or entries.max() >= len(V):
         raise StorageError(f"{len(entries)} sampled entries do not fit a basis of {len(V)} rows")
-    per_element = 3 * rows_per_element
-    length = {"scalar": 1, "joint": 3, "element": per_element}[rows]  # residual entries per sample
     steps = []
-    for k in range(min(count, len(entries) // per_step, V.shape[1])):
-        residual = _residual(V, entries[: k * per_step], k, rows == "joint")
-        norms = np.linalg.norm(residual.reshape(-1, length), axis=1)
-        picked = entries[: (k + 1) * per_step : per_step] // per_element
-        magnitude = norms.reshape(-1, per_element // length).max(axis=1)
-        *earlier, newest = picked.tolist()
-        steps.append(Iteration(k + 1, magnitude, earlier, newest, int(entries[k * per_step])))
+    for k in range(min(count, len(entries), V.shape[1])):
+        earlier = entries[:k]
+        coefficients = np.linalg.lstsq(V[earlier, :k], V[earlier, k], rcond=None)[0]
+        residual = np.abs(V[:, k] - V[:, :k] @ coefficients)
+        magnitude = residual.reshape(-1, 3 * rows_per_element).max(axis=1)
+        *before, newest = (entries[: k + 1] // (3 * rows_per_element)).tolist()
+        steps.append(Iteration(k + 1, magnitude, before, newest, int(entries[k])))
     return steps
-
-
-def _residual(V: np.ndarray, entries: np.ndarray, k: int, joint: bool = False) -> np.ndarray:
-    """Residual of mode k, fitted by earlier modes at ``entries``; ``joint``: x, y, z separately."""
-    if joint:
-        parts = [_residual(V[axis::3], entries // 3, k) for axis in range(3)]
-        return np.stack(parts, axis=1).ravel()
-    coefficients = np.linalg.lstsq(V[entries, :k], V[entries, k], rcond=None)[0]
-    return V[:, k] - V[:, :k] @ coefficients
 
 
 @figure(
     number=3, title="Elements hit by the entries of vectorised DEIM",
     reads={
-        "meshes": EachOf(MESH, "experiments"), "snapshots": EachOf(SNAPSHOTS, "experiments"),
-        "samples": EachOf(SAMPLING, "runs"),
+        "meshes": EachOf(MESH, "drawn.experiments"),
+        "snapshots": EachOf(SNAPSHOTS, "drawn.experiments"),
+        "samples": EachOf(SAMPLING, "drawn.runs"),
     },
     scenes="spring_twist strain_twist_twin bar_release disc_strain torus_release starfish_twist",
     methods="deim qdeim block-deim",
@@ -157,37 +139,34 @@ def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
     Right: numbers that have to be computed for $r$ interpolation entries, because a projection
     yields all entries of its element at once.
     """
-    methods = drawn.methods
-    scalar = [m for m in methods if drawn.reductions[m].rows == "scalar"]
-    if not scalar:
-        raise NothingToDraw("no method that samples single entries (deim, qdeim)")
-    samples = files["samples"]
+    scalar = [m for m, reduction in drawn.reductions.items() if reduction.rows == "scalar"]
     read = [
-        (each, {m: read_samplings(each.path(samples, method=m)) for m in methods})
+        (each, {m: read_samplings(each.find(files["samples"], method=m)) for m in drawn.methods})
         for each in drawn.experiments
     ]
-    if not (sampled := [(each, found) for each, found in read if found[scalar[0]]]):
-        raise NothingToDraw("no samples")
+    sampled = [(each, found) for each, found in read if scalar and found[scalar[0]]]
+    if not sampled:
+        raise NothingToDraw
     figure = style.new_figure(ROW_HEIGHT * len(sampled) + 0.55)
     axes = figure.subplots(len(sampled), 3, squeeze=False, width_ratios=[1.25, 1.0, 1.1])
     for row, (each, samplings) in zip(axes, sampled, strict=True):
-        source = each.path(files["snapshots"])
+        source = each.find(files["snapshots"])
         with open_hdf5(source) as file:
             count, rows = int(file.attrs["elements"]), int(file.attrs["rows_per_element"])
-        mesh = load_mesh(each.path(files["meshes"]))
+        mesh = load_mesh(each.find(files["meshes"]))
         elements = shapes.element_map(each.group, mesh, count, source=source)
         sizes = samplings[scalar[0]]
         r = ENTRIES if ENTRIES in sizes else max(sizes)
         _draw_hits(row[0], elements, sizes[r].entries, 3 * rows, camera_of(each))
         row[0].set_title(f"{each.title}\nr = {r} entries")
         _draw_counts(row[1], sizes[r].entries // (3 * rows), 3 * rows)
-        _draw_evaluations(row[2], samplings, 3 * rows)
+        _draw_evaluations(row[2], samplings, 3 * rows, drawn.looks)
     dots = {"linestyle": "none", "marker": "o", "markersize": 4.5}
     handles = [
         style.handle("several axes" if axis == SEVERAL else f"{axis} entry", color=colour, **dots)
         for axis, colour in AXES.items()
     ]
-    handles += drawn.handles(declaration.method_styles(methods))
+    handles += drawn.handles(drawn.looks)
     handles.append(style.handle("numbers that DEIM uses (r)", color=style.GREY, linestyle="--"))
     style.legend(figure, handles, 4)
     return figure
@@ -225,14 +204,14 @@ def _draw_counts(ax: Axes, hit: np.ndarray, per_element: int) -> None:
 
 
 def _draw_evaluations(
-    ax: Axes, samplings: dict[str, dict[int, Sampling]], per_element: int
-) -> None:
-    styles = declaration.method_styles(samplings)
+    ax: Axes, samplings: dict[str, dict[int, Sampling]], per_element: int,
+    looks: dict[str, tuple[str, str]],
+) -> None:  # fmt: skip
     largest = 1
     for method, sizes in samplings.items():
         if sizes:
             computed = [per_element * len(sampled.elements) for sampled in sizes.values()]
-            colour, marker = styles[method]
+            colour, marker = looks[method]
             every = max(1, len(sizes) // 6)
             ax.plot(list(sizes), computed, color=colour, marker=marker, markevery=every)
             largest = max(largest, *sizes)
@@ -251,8 +230,8 @@ LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures of the me
 @figure(
     number=1, title="Snapshots of the projections and their modes",
     reads={
-        "meshes": EachOf(MESH, "first_run"), "full_order": EachOf(TRAIN, "first_run"),
-        "sets": EachOf(SNAPSHOTS, "first_run"), "bases": EachOf(BASIS, "first_run"),
+        "meshes": EachOf(MESH, "drawn.first_run"), "full_order": EachOf(TRAIN, "drawn.first_run"),
+        "sets": EachOf(SNAPSHOTS, "drawn.first_run"), "bases": EachOf(BASIS, "drawn.first_run"),
     }, scenes=SCENES, methods="deim block-deim pod",
 )  # fmt: skip
 def snapshots_and_modes(drawn: Drawn, **files: list[File]) -> Figure:
@@ -262,8 +241,6 @@ def snapshots_and_modes(drawn: Drawn, **files: list[File]) -> Figure:
     first modes on the mesh at rest: an element has the colour of one of its entries, whose axis and
     row are named, relative to the largest.
     """
-    if not files["bases"]:
-        raise NothingToDraw("no basis")
     experiment, path = drawn.experiments[0], files["bases"][0].path
     basis, snapshots = load_basis(path), load_snapshots(files["sets"][0].path)
     mesh = load_mesh(files["meshes"][0].path)

@@ -16,7 +16,7 @@ from study.tables.kit.results import TWIN
 
 # Inputs of `floors_of`.
 FLOORS: dict[str, Read] = {
-    "sensitivity": EachOf(SENSITIVITY, "experiments"),
+    "sensitivity": EachOf(SENSITIVITY, "drawn.experiments"),
     "horizon": Setting("horizon"),
 }
 COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
@@ -60,7 +60,7 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
         if len(floors[scene][0]):
             kinds.setdefault(_kind(drawn, scene), []).append(scene)
     if not kinds:
-        raise NothingToDraw(f"no run perturbed by {horizon.perturbation:g}")
+        raise NothingToDraw
     columns = min(3, len(kinds))
     figure, axes = small_multiples(len(kinds), columns, height=2.7)
     for ax, (kind, scenes) in zip(axes, kinds.items(), strict=True):
@@ -91,8 +91,6 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
 
 
 def _kind(drawn: Drawn, scene: str) -> str:
-    groups = [experiment.group for experiment in drawn.of(scene)]
-    if len(groups) > 1:
-        return "several groups"
-    on_volume = EFFECTS.load(groups[0]).cells == "tetrahedron"
-    return "tetrahedra" if on_volume else style.words(groups[0])
+    first, *others = drawn.of(scene)
+    on_volume = not others and EFFECTS.load(first.group).cells == "tetrahedron"
+    return "tetrahedra" if on_volume else drawn.groups_of(scene)

@@ -10,11 +10,9 @@ from study.artifact.reads import TableOf
 from study.figures.kit.declaration import Drawn, NothingToDraw, figure
 
 RANKS = (6, 10, 20, "full")  # basis sizes; full stands for the numerical rank
-CELLS = 48  # largest panel width, in cells; blocks of columns that do not fit go to another panel
 ROW = 0.145  # height of a row of cells, inches
 GAP = 0.45  # distance between blocks of columns, in widths of a cell
 LEAST = 2.0  # smallest width of a block of columns, in widths of a cell, so that its title fits
-DENSE = 30  # panels with more columns than this have vertical labels and titles of two lines
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,6 @@ LOOKS = {
 
 
 Cells = dict[tuple[str, str], pd.Series]  # a column of the map: (scene, group) -> table row
-Block = tuple[str, list[str], list[Cells]]
 
 
 @dataclass(frozen=True)
@@ -49,25 +46,22 @@ class Strip:
     """Panel of the stability map.
 
     rows : (scene, group) -> label
-    blocks : (title, labels of columns, columns) for each block of neighbouring columns
+    blocks : title -> neighbouring columns by their labels
     """
 
     rows: dict[tuple[str, str], str]
-    blocks: list[Block]
+    blocks: dict[str, dict[str, Cells]]
     xlabel: str
 
     def draw(self, ax: Axes) -> set[str]:
         """Draw on ``ax`` a cell for each row and column with a run; return their outcomes."""
         x, ticks, drawn = 0.0, [], set()
-        texts = [label for _, labels, _ in self.blocks for label in labels]
-        dense = len(texts) > DENSE
-        for title, labels, columns in self.blocks:
-            width = len(labels)
+        for title, columns in self.blocks.items():
+            width = len(columns)
             room = max(0.5 * (LEAST - width), 0.0)
             x += room
-            title = title.replace("-", "-\n", 1) if dense else title
             ax.text(x + 0.5 * width, -0.25, title, ha="center", va="bottom", fontsize=6.5)
-            for k, cells in enumerate(columns):
+            for k, cells in enumerate(columns.values()):
                 ticks.append(x + k + 0.5)
                 for i, key in enumerate(self.rows):
                     if key in cells:
@@ -75,7 +69,8 @@ class Strip:
                         drawn.add(str(cells[key].outcome))
             x += width + room + GAP
         ax.set(xlim=(0.0, x - GAP), ylim=(len(self.rows), 0.0))
-        ax.set_xticks(ticks, texts, fontsize=6, rotation=90 if dense else 0)
+        texts = [label for columns in self.blocks.values() for label in columns]
+        ax.set_xticks(ticks, texts, fontsize=6)
         places = [i + 0.5 for i in range(len(self.rows))]
         ax.set_yticks(places, list(self.rows.values()), fontsize=6.5)
         ax.tick_params(length=0, pad=2)
@@ -105,9 +100,10 @@ def stability_map(drawn: Drawn, table: pd.DataFrame) -> Figure:
     whose projections are round-off are left out.
     """
     table = table[(table.experiment == "rerun") & (table.group.notna())]
-    strips = _local_strips(table, drawn) + _subspace_strips(table)
+    strips = [_local_strip(table, drawn), _subspace_strip(table)]
+    strips = [strip for strip in strips if strip.rows and strip.blocks]
     if not strips:
-        raise NothingToDraw("no reduced run")
+        raise NothingToDraw
     rows = [len(strip.rows) for strip in strips]
     figure = style.new_figure(ROW * sum(rows) + 0.5 * len(strips) + 0.55)
     axes = figure.subplots(len(strips), 1, squeeze=False, height_ratios=rows)[:, 0]
@@ -126,7 +122,7 @@ def stability_map(drawn: Drawn, table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _local_strips(table: pd.DataFrame, drawn: Drawn) -> list[Strip]:
+def _local_strip(table: pd.DataFrame, drawn: Drawn) -> Strip:
     part = table[table.position_basis == "full"]
     ran = part[part.outcome != "not run"]
     held = set(zip(ran.scene, ran.group, strict=True))
@@ -134,40 +130,25 @@ def _local_strips(table: pd.DataFrame, drawn: Drawn) -> list[Strip]:
     rows = {key: title for key, title in keys.items() if key in held}
     ranks = [r for r in RANKS if r == "full" or r in set(part.r)]
     largest = ran.sort_values("r", kind="stable").groupby(["scene", "group", "method"]).tail(1)
-    blocks: list[Block] = []
+    blocks = {}
     for method in dict.fromkeys(part.method):
         own, whole = (rows_of[rows_of.method == method] for rows_of in (part, largest))
-        columns = [_cells(whole if r == "full" else own[own.r == r]) for r in ranks]
-        blocks.append((method, [str(r) for r in ranks], columns))
-    return _wrapped(rows, blocks, "number of modes r (full: numerical rank)")
+        blocks[method] = {str(r): _cells(whole if r == "full" else own[own.r == r]) for r in ranks}
+    return Strip(rows, blocks, "number of modes r (full: numerical rank)")
 
 
-def _subspace_strips(table: pd.DataFrame) -> list[Strip]:
+def _subspace_strip(table: pd.DataFrame) -> Strip:
     part = table[table.position_basis != "full"]
     rows = {(scene, "all"): style.words(scene) for scene in dict.fromkeys(part.scene)}
-    blocks: list[Block] = []
+    blocks = {}
     for basis, method in dict.fromkeys(zip(part.position_basis, part.method, strict=True)):
         own = part[(part.position_basis == basis) & (part.method == method)]
-        sizes = sorted(own.k.dropna().unique())
         title = f"{basis}\n{'all' if method == 'full' else method}"
-        labels = [str(int(k)) for k in sizes]
-        blocks.append((title, labels, [_cells(own[own.k == k]) for k in sizes]))
+        sizes = sorted(own.k.dropna().unique())
+        blocks[title] = {str(int(k)): _cells(own[own.k == k]) for k in sizes}
     label = "number of modes k of the position subspace (all: all projections)"
-    return _wrapped(rows, blocks, label)
+    return Strip(rows, blocks, label)
 
 
 def _cells(rows: pd.DataFrame) -> Cells:
     return {(row.scene, row.group): row for _, row in rows.iterrows()}
-
-
-def _wrapped(rows: dict[tuple[str, str], str], blocks: list[Block], xlabel: str) -> list[Strip]:
-    """Distribute ``blocks`` of columns to strips of at most `CELLS` columns, with all ``rows``."""
-    parts: list[list[Block]] = []
-    used = 0
-    for block in blocks if rows else ():
-        used += len(block[1])
-        if not parts or used > CELLS:
-            parts.append([])
-            used = len(block[1])
-        parts[-1].append(block)
-    return [Strip(rows, part, xlabel) for part in parts]

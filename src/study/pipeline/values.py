@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
-from pdrom.model import constraints
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.effects import EFFECTS
 from pdrom.model.held_out import HeldOut
@@ -28,7 +27,7 @@ from study.experiments.repetitions import Cell, Repeated
 from study.experiments.reruns import Stability
 from study.experiments.subspaces import JOINT, JointRows
 from study.experiments.timing import SCALED
-from study.figures.kit.declaration import Experiment, Reduction, declarations
+from study.figures.kit.declaration import Drawn, Experiment, Reduction, declarations
 from study.paper.build import PAGES, Facts
 from study.paper.source import source_files
 from study.pipeline.folders import DEFAULT
@@ -117,45 +116,30 @@ def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
     )
 
 
-def _experiments(study: Study, labels: Labels) -> tuple[Experiment, ...]:
-    """Reduced groups that a figure draws: of the scenes it names, or else of those it is about."""
+def _drawn(study: Study, labels: Labels) -> Drawn:
+    """Scenes and methods that a figure names, or else those of the study that fit the figure."""
     figure = declarations()[labels["figure"]]
-    about = {
-        name: config
+    fitting = [
+        name
         for name, config in study.scenes.items()
         if len(config.reduce) > figure.several
         and not (figure.groups and {*figure.groups}.isdisjoint(config.reduce))
-    }
-    named = {name: study.scenes[name] for name in figure.scenes if name in study.scenes}
-    return tuple(
-        Experiment(
-            scene=scene,
-            group=group,
-            mesh=config.mesh.identifier,
-            effects=config.effects,
-            only=len(config.reduce) == 1,
-        )
-        for scene, config in (named or about).items()
-        for group in config.reduce
-    )
-
-
-def _reductions(study: Study, labels: Labels) -> dict[str, Reduction]:
-    """Name -> method, for those that a figure names, or else all of the study."""
-    named = declarations()[labels["figure"]].methods
-    held = [name for name in named if name in study.methods] or study.methods
-    specs = {name: study.methods[name] for name in held}
-    return {name: Reduction(title=spec.title, rows=spec.rows) for name, spec in specs.items()}
-
-
-def _runs(study: Study, labels: Labels) -> tuple[Experiment, ...]:
-    """All combinations of the reduced groups and the methods that a figure shows."""
-    methods = _reductions(study, labels)
-    return tuple(
-        experiment.model_copy(update={"method": method})
-        for experiment in _experiments(study, labels)
-        for method in methods
-    )
+    ]
+    scenes = [name for name in figure.scenes if name in study.scenes] or fitting
+    methods = [name for name in figure.methods if name in study.methods] or study.methods
+    found = [(name, study.scenes[name]) for name in scenes]
+    specs = [(name, study.methods[name]) for name in methods]
+    return Drawn(
+        experiments=tuple(
+            Experiment(
+                scene=scene, group=group, mesh=config.mesh.identifier, effects=config.effects,
+                only=len(config.reduce) == 1,
+            )
+            for scene, config in found
+            for group in config.reduce
+        ),
+        reductions={name: Reduction(title=spec.title, rows=spec.rows) for name, spec in specs},
+    )  # fmt: skip
 
 
 def _facts(study: Study, labels: Labels) -> Facts:
@@ -266,20 +250,13 @@ DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
     "projection_methods": lambda study, labels: {
         case.method: study.methods[case.method] for case in _projection_cases(study, labels)
     },
-    "experiments": _experiments,
-    "reductions": _reductions,
-    "runs": _runs,
-    "first_run": lambda study, labels: _runs(study, labels)[:1],
+    "drawn": _drawn,
     # reduced groups that a figure shows, if the scene has models in position subspaces
     "drawn_subspaces": lambda study, labels: tuple(
         each
-        for each in _experiments(study, labels)
+        for each in _drawn(study, labels).experiments
         if _holds(study, paths.SUBSPACES, {"scene": each.scene})
     ),
-    # names of all kinds of constraint groups
-    "groups": lambda study, labels: [
-        name for name in EFFECTS if EFFECTS[name].startswith(constraints.__name__)
-    ],
     # TeX files of paper and supplement
     "manuscript": lambda study, _: SimpleNamespace(sources=source_files(study.root, study.is_own)),
     "facts": _facts,

@@ -5,7 +5,7 @@ docstring is the caption::
 
     @figure(
         title="Rest shapes",
-        reads={"meshes": EachOf(MESH, "experiments")},
+        reads={"meshes": EachOf(MESH, "drawn.experiments")},
         scenes="strain_oop bar_release",
     )
     def rest_shapes(drawn: Drawn, meshes: list[File]) -> Figure:
@@ -26,6 +26,7 @@ import pandas as pd
 from pydantic import BaseModel
 
 from pdrom.core.store import atomic_path
+from pdrom.model import constraints
 from pdrom.model.effects import EFFECTS
 from pdrom.model.effects.base import EffectConfigs
 from pdrom.view import style
@@ -34,7 +35,7 @@ from pdrom.view.camera import Camera, up_of
 from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.markup import to_plain
 from study.artifact.paths import FIGURE, FIGURE_PICTURE, File
-from study.artifact.reads import Read, Settings, TableOf
+from study.artifact.reads import Read, Setting, TableOf
 from study.tables.effects_cost import unreliable
 
 MESHES = "disc_strain ball_shell torus_release starfish_twist"  # scenes of config/extended.yaml
@@ -51,11 +52,21 @@ METHODS: dict[str, tuple[str, str]] = {
     "bounded": ("#1F9E89", "*"),
 }
 _RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))
+_GROUPS = [name for name in EFFECTS if EFFECTS[name].startswith(constraints.__name__)]
+# Constraint group -> colour and marker.
+GROUPS = dict(zip(_GROUPS, cycle(style.GROUP_LOOKS), strict=False))
 AZIMUTH = 30.0  # azimuth of every camera, degrees
 
 
 class NothingToDraw(Exception):
-    """Raised if the configuration has no data for a figure; the message names what is missing."""
+    """Raised if the configuration has no data for a figure."""
+
+
+def held(table: pd.DataFrame) -> pd.DataFrame:
+    """Return ``table``; NothingToDraw if it has no row."""
+    if table.empty:
+        raise NothingToDraw
+    return table
 
 
 def camera_of(experiment: "Experiment", elevation: float = 20.0) -> Camera:
@@ -101,18 +112,11 @@ class Experiment(BaseModel, extra="forbid", frozen=True):
         """Title of a panel; the group is named only if the scene reduces several groups."""
         return style.words(self.scene if self.only else f"{self.scene}: {self.group}")
 
-    def find(self, files: Sequence[File], **labels: str) -> str | None:
-        """First path in ``files`` for this scene, group, mesh and ``labels``; None without one."""
+    def find(self, files: Sequence[File], **labels: str) -> str:
+        """First path in ``files`` for this scene, group, mesh and ``labels``; "" without one."""
         own = self.labels | labels
         found = (f.path for f in files if all(own.get(k, v) == v for k, v in f.labels.items()))
-        return next(found, None)
-
-    def path(self, files: Sequence[File], **labels: str) -> str:
-        """Path that the method `find` returns; LookupError if there is no such file."""
-        path = self.find(files, **labels)
-        if path is None:
-            raise LookupError(f"no file of {self.labels | labels}")
-        return path
+        return next(found, "")
 
 
 class Reduction(BaseModel, extra="forbid", frozen=True):
@@ -127,12 +131,24 @@ class Drawn(BaseModel, extra="forbid", frozen=True):
 
     experiments : each is a scene with one of its reduced groups
     reductions : name of a method -> its description
-    groups : names of all constraint groups that exist; their order determines their colours
     """
 
     experiments: tuple[Experiment, ...]
     reductions: dict[str, Reduction]
-    groups: tuple[str, ...]
+
+    @property
+    def runs(self) -> list[Experiment]:
+        """All combinations of experiments and methods."""
+        return [
+            experiment.model_copy(update={"method": method})
+            for experiment in self.experiments
+            for method in self.reductions
+        ]
+
+    @property
+    def first_run(self) -> list[Experiment]:
+        """First of the `runs`; empty without one."""
+        return self.runs[:1]
 
     @property
     def scenes(self) -> list[str]:
@@ -146,17 +162,22 @@ class Drawn(BaseModel, extra="forbid", frozen=True):
 
     @property
     def looks(self) -> dict[str, tuple[str, str]]:
-        """Name of each constraint group -> (colour, marker)."""
-        return dict(zip(self.groups, cycle(style.GROUP_LOOKS), strict=False))
+        """Name of each selected method -> (colour, marker)."""
+        return method_styles(self.methods)
 
     def of(self, scene: str) -> list[Experiment]:
         """Experiments in ``scene``: one for each of its reduced constraint groups."""
         return [experiment for experiment in self.experiments if experiment.scene == scene]
 
+    def groups_of(self, scene: str) -> str:
+        """Name of the reduced constraint group of ``scene``, or "several groups"."""
+        groups = [experiment.group for experiment in self.of(scene)]
+        return style.words(groups[0]) if len(groups) == 1 else "several groups"
+
     def title(self, method: str) -> str:
         """Title of ``method`` as plain words; its name if the method is not selected."""
-        held = self.reductions.get(method)
-        return style.plain_words(held.title if held else method)
+        known = self.reductions.get(method)
+        return style.plain_words(known.title if known else method)
 
     def handles(self, looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
         """Legend entries for ``looks`` (method -> colour, marker); ``common``: options of each."""
@@ -165,18 +186,21 @@ class Drawn(BaseModel, extra="forbid", frozen=True):
             for method, (colour, marker) in looks.items()
         ]
 
-    def scenes_of(self, table: pd.DataFrame, nothing: str) -> list[str]:
-        """Scenes that have rows in ``table``; NothingToDraw with text ``nothing`` if none has."""
-        scenes = [scene for scene in self.scenes if (table.scene == scene).any()]
-        if not scenes:
-            raise NothingToDraw(nothing)
-        return scenes
+    def scenes_of(self, table: pd.DataFrame) -> list[str]:
+        """Scenes that have rows in ``table``; NothingToDraw if none has."""
+        present = set(held(table[table.scene.isin(self.scenes)]).scene)
+        return [scene for scene in self.scenes if scene in present]
+
+    def styles(self, table: pd.DataFrame) -> dict[str, tuple[str, str]]:
+        """Those of `looks` whose methods have rows in ``table``; NothingToDraw without one."""
+        present = set(held(table[table.method.isin(self.methods)]).method)
+        return {method: look for method, look in self.looks.items() if method in present}
 
     def rows(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Rows of ``table`` whose scene, group and method are selected."""
+        """Rows of ``table`` whose scene, group and method are selected; NothingToDraw without."""
         pairs = pd.MultiIndex.from_frame(table[["scene", "group"]])
-        held = pairs.isin([(each.scene, each.group) for each in self.experiments])
-        return table[held & table.method.isin(self.methods)]
+        drawn = pairs.isin([(each.scene, each.group) for each in self.experiments])
+        return held(table[drawn & table.method.isin(self.methods)])
 
 
 log = logging.getLogger(__name__)
@@ -185,7 +209,7 @@ PNG_DPI = 200
 RASTER_DPI = 300  # dots per inch of the rasterised parts of a PDF
 TIMES = "times_of_run"  # key of the input of a timed figure that says whether times are reliable
 DISTURBED = "these times are unreliable: other programs used the processor"
-ELSEWHERE = "the full study (config/default.yaml) draws it"
+NO_DATA = "no data in this configuration; the full study (config/default.yaml) draws this figure"
 
 
 @dataclass(frozen=True)
@@ -195,10 +219,9 @@ class Declaration(Artifact):
     title, caption : text in the mark-up of `study.artifact.markup`; ``{key}`` in a caption stands
         for the value of a setting
     number : number of the figure of the preprint that this one reproduces; None if there is none
-    scenes, methods : names in the order of drawing, as far as the study has them; all methods if it
-        has none of these
-    groups, several : if the study has none of ``scenes``, its scenes that reduce one of ``groups``
-        (any group if empty), or several groups, are drawn
+    scenes, methods : names in the order of drawing, as far as the study has them; of a study that
+        has none of them its own methods, and its scenes that fit:
+    groups, several : those that reduce one of ``groups`` (any group if empty), or several groups
     """
 
     caption: str = ""
@@ -221,13 +244,17 @@ class Declaration(Artifact):
         times = read.pop(TIMES, None)
         with style.look():
             try:
+                if "drawn" in read and not read["drawn"].experiments:
+                    raise NothingToDraw
                 drawn = self.function(**read)
-                if times is not None and unreliable(times):
-                    drawn.suptitle(DISTURBED, fontsize=8, color=style.FAILED)
+            except NothingToDraw:
+                log.info("figure %s: no data", self.name)
+                drawn = style.new_figure(0.45, None)
+                drawn.text(0.5, 0.5, NO_DATA, ha="center", va="center", color="#444444")
                 return drawn
-            except NothingToDraw as nothing:
-                log.info("figure %s: %s", self.name, nothing)
-                return style.note(f"no data in this configuration: {nothing}\n{ELSEWHERE}")
+            if times is not None and unreliable(times):
+                drawn.suptitle(DISTURBED, fontsize=8, color=style.FAILED)
+            return drawn
 
 
 def figure(
@@ -247,16 +274,16 @@ def figure(
 
     def decorate(function: Callable[..., Figure]) -> Declaration:
         name = function.__name__
-        writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
-        drawn = {"drawn": Settings(Drawn)} if "drawn" in function.__annotations__ else {}
         if not function.__doc__:
             raise TypeError(f"figure {name}: the function has no docstring, which is its caption")
-        words = " ".join([*function.__doc__.split(), *more.split()])
-        times = {TIMES: TableOf("frame_times")} if timed else {}
+        drawn = {"drawn": Setting("drawn")} if "drawn" in function.__annotations__ else {}
         made = Declaration(
-            name, title, {**drawn, **reads}, writes, function, caption=words, number=number,
+            name, title, {**drawn, **reads},
+            {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}, function,
+            caption=" ".join([*function.__doc__.split(), *more.split()]), number=number,
             scenes=scenes.split(), methods=methods.split(), groups=groups.split(), several=several,
         )  # fmt: skip
+        times = {TIMES: TableOf("frame_times")} if timed else {}
         return replace(declare(made), reads={**made.reads, **times})
 
     return decorate

@@ -10,7 +10,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.types import Mesh
 from pdrom.view.artists import Axes, Normalize, ScalarMappable
 from pdrom.view.camera import Camera
-from pdrom.view.mesh_render import draw_lines, draw_surface
+from pdrom.view.mesh_render import RASTER_ABOVE, draw_surface
 
 NEUTRAL = "#E4E1DA"
 SIGNED = "RdBu_r"
@@ -78,10 +78,17 @@ class ElementMap:
         colours: ScalarMappable,
     ) -> None:  # fmt: skip
         """Draw the mesh at ``points`` (N, 3) m, elements coloured by ``values`` (e,)."""
+        from matplotlib.collections import LineCollection
+
         if self.kind == "edge" and not len(self.mesh.tetrahedra):
             look = {"colour": "#FFFFFF", "wire": 0.0, "contrast": 0.15}
             draw_surface(ax, points, self.mesh, camera=camera, **look)
-            draw_lines(ax, points[self.cells], camera, colours=colours.to_rgba(values))
+            lines = points[self.cells]
+            order = np.argsort(camera.depth(lines.mean(axis=1)), kind="stable")  # far ones first
+            flat, shades = camera.project(lines.reshape(-1, 3)), colours.to_rgba(values)
+            look = {"linewidths": 1.2, "capstyle": "round", "rasterized": len(lines) > RASTER_ABOVE}
+            flat = flat.reshape(-1, 2, 2)[order]
+            ax.add_collection(LineCollection(flat, colors=shades[order], zorder=2.0, **look))
             return
         carried = self.face_values(values)
         rgb = colours.to_rgba(np.nan_to_num(carried))[:, :3]

@@ -37,7 +37,6 @@ class RerunInfo:
     full : whether r is the numerical rank of the snapshots
     marked : whether r exceeds that rank, so that nothing ran
     blowup_frame : frame at which the run blew up, -1 if it did not
-    entries : number of stored frames, including the initial state
     """
 
     path: str
@@ -46,7 +45,6 @@ class RerunInfo:
     full: bool
     marked: bool
     blowup_frame: int
-    entries: int
 
     @property
     def title(self) -> str:
@@ -56,8 +54,9 @@ class RerunInfo:
     def at(self, frame: int) -> tuple[int, np.ndarray] | None:
         """Index and positions (N, 3) m of the last finite frame up to ``frame``, or None."""
         with open_hdf5(self.path) as file:
-            for entry in range(min(frame, self.entries - 1), -1, -1):
-                positions = np.asarray(file[self.label]["positions"][entry], dtype=float)
+            stored = file[self.label]["positions"]
+            for entry in range(min(frame, len(stored) - 1), -1, -1):
+                positions = np.asarray(stored[entry], dtype=float)
                 if np.isfinite(positions).all():
                     return entry, positions
         return None
@@ -88,7 +87,6 @@ def rerun_infos(path: str, inside: str = "") -> list[RerunInfo]:
                 full=bool(group.attrs.get("full", False)),
                 marked=bool(group.attrs["marked"]),
                 blowup_frame=int(group.attrs.get("blowup_frame", -1)),
-                entries=0 if group.attrs["marked"] else len(group["positions"]),
             )
             for label, group in file[f"/{inside}"].items()
             if "marked" in group.attrs

@@ -76,10 +76,3 @@ def test_the_shape_fills_the_canvas_has_wires_and_goes_with_its_handle(folder, w
         assert handle() - [y, x] == pytest.approx([40, 20], abs=6)
         assert ('no nosuch"%: it shows test' in page.inner_text("#verdict")) == ("?" in address)
         assert page.said == [url for url in page.asked if not url.startswith("file:")] == []
-
-
-@pytest.mark.slow
-def test_a_page_that_was_cut_says_so(folder, tmp_path):
-    (tmp_path / "cut.html").write_bytes((folder / "a.model.html").read_bytes()[:-2000])
-    with page_at((tmp_path / "cut.html").as_uri(), width=900, height=800) as page:
-        assert "the file was cut" in page.inner_text("#verdict")

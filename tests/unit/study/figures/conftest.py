@@ -82,7 +82,7 @@ def mesh_of(scene: str) -> Mesh:
 
 
 def make_results(results: Invented) -> None:
-    rng, effects = np.random.default_rng(7), reference("effects_cost")
+    rng = np.random.default_rng(7)
     for scene, config in results.study.scenes.items():
         mesh = mesh_of(scene)
         save_mesh(mesh, results.path(paths.MESH, scene))
@@ -107,7 +107,7 @@ def make_results(results: Invented) -> None:
                 _write_reruns(results, scene, group, method, positions, rank, rng)
         if scene in FLAT:
             _write_noise_runs(results, scene)
-        _write_series(results, scene, effects)
+        _write_floors(results, scene)
     _write_tables(results)
 
 
@@ -129,7 +129,6 @@ def _write_bases(results, scene, group, count, rank, rng) -> Basis:
 
 def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
     with write_hdf5(results.path(paths.RERUNS, scene, group, method)) as file:
-        file["displacement"] = np.ones(FRAMES)
         for r in (6, 10, 14, 20):
             store = file.create_group(f"r{r:04d}")
             store.attrs.update(r=r, full=r == rank, marked=r > rank)
@@ -141,10 +140,8 @@ def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
             if failed:
                 moved[-1] = np.nan
             store["positions"] = moved.astype(np.float32)
-            store["error"] = np.geomspace(1e-4, 1e-1, last) / r
-            store["extent"] = np.ones(last)
             blowup = BLOWUP_FRAME if failed else -1
-            store.attrs.update(finite=not failed, blowup_frame=blowup, max_extent=1.1)
+            store.attrs.update(blowup_frame=blowup)
 
 
 def reference(name: str) -> pd.DataFrame:
@@ -182,21 +179,13 @@ def _write_noise_runs(results, scene) -> None:
                 store = file.create_group(f"{axes}/deim-joint/r{r:04d}")
                 store["positions"] = np.repeat(points[None], frames + 1, axis=0)
                 store.attrs.update(r=r, marked=r > 9, blowup_frame=-1 if frames else 0)
-                store.attrs["max_extent"] = 1.0
 
 
-def _write_series(results, scene, effects) -> None:
-    """Forces of the effects of a scene, of a start once; floors, which rise for springs only."""
-    forces = [
-        (scene, row.effect, row.role, i, 1.0 + i, None)
-        for row in effects[effects.force.notna() & (effects.scene == scene)].itertuples()
-        for i in range(1 if row.role == "start" else FRAMES)
-    ]
-    names = "scene effect role frame force energy"
-    write_table(frame(names, *forces), results.path(paths.CONTRIBUTIONS, scene))
+def _write_floors(results, scene) -> None:
+    """Floors, which rise for springs only."""
     floors = [
         (scene, label, i, 10.0 ** (-9 + (0.5 * i if "spring" in scene else 0.05)))
-        for label in ("1e-10", "1e-08", "solver")
+        for label in ("1e-10", "solver")
         for i in range(FRAMES)
     ]
     names = "scene perturbation frame relative_difference"

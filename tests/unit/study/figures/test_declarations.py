@@ -10,7 +10,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.reduction.method import load_methods
 from pdrom.view import style
 from places import CONFIG, ROOT
-from study.figures.kit.declaration import METHODS, declarations, figure, method_styles
+from study.figures.kit.declaration import METHODS, declarations, method_styles
 from study.pipeline.scenes import scene_names
 
 
@@ -18,11 +18,6 @@ def test_figures_of_the_paper_come_first_in_their_order():
     numbers = [declared.number for declared in declarations().values()]
     assert numbers[:9] == list(range(1, 10))
     assert set(numbers[9:]) == {None}
-
-
-def test_a_figure_has_a_caption():
-    with pytest.raises(TypeError, match="no docstring, which is its caption"):
-        figure(title="Nothing", reads={})(lambda drawn: drawn)
 
 
 def test_figures_name_scenes_methods_and_groups_that_exist():
@@ -38,9 +33,8 @@ def test_figures_name_scenes_methods_and_groups_that_exist():
 
 @pytest.mark.parametrize("name", ["strain_runs", "teaser", "local_share", "ladder", "spring_runs"])
 def test_a_study_without_the_scenes_of_a_figure_draws_its_own_that_fit(small_study, name):
-    drawn = (
-        small_study(["strain_twist"], ["pod"]).job(name, scenes=("strain_oop",)).settings["drawn"]
-    )
+    study = small_study(["strain_twist"], ["pod"])
+    drawn = study.job(name, scenes=("strain_oop",)).settings["drawn"]
     fitting = [] if name == "spring_runs" else ["strain_twist"]
     assert [each["scene"] for each in drawn["experiments"]] == fitting
     assert [*drawn["reductions"]] == ["pod"]

@@ -1,9 +1,5 @@
 """Every figure draws from invented results; what it says about failures and missing data."""
 
-import json
-import os
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -75,45 +71,6 @@ def test_every_figure_is_written_without_warnings_and_its_panels_hold_data(
     assert pdf.stat().st_size < 1_500_000
     checksums = [checksum_path(pdf).name, checksum_path(png).name]
     assert sorted(path.name for path in tmp_path.iterdir()) == [*checksums, "a.pdf", "a.png"]
-
-
-DRAW_ALL = """
-import json, sys
-from pathlib import Path
-from study.figures.kit.declaration import declarations
-from study.pipeline.folders import Folders
-from study.pipeline.plan import Plan
-from study.pipeline.study import Study
-
-settings, project, root, out = sys.argv[1:]
-plan = Plan(Study(json.loads(settings), Path(project)), Folders(root))
-for name, figure in declarations().items():
-    job = plan.job(figure, {})
-    figure.perform(job.settings, job.inputs, {kind: f"{out}/{name}.{kind}" for kind in job.outputs})
-"""
-
-
-@pytest.mark.slow
-def test_bytes_are_equal_in_another_process(study, tmp_path):
-    """Another hash seed and other settings of the user must not change a byte."""
-    environment = {
-        **os.environ,
-        "PYTHONHASHSEED": "99",
-        "PYTHONPATH": os.pathsep.join(sys.path),
-        "MATPLOTLIBRC": str(tmp_path / "matplotlibrc"),
-        "SOURCE_DATE_EPOCH": "86400",
-    }
-    (tmp_path / "matplotlibrc").write_text("font.size: 31\nsavefig.bbox: tight\nfigure.dpi: 50\n")
-    arguments = [json.dumps(study.settings), str(ROOT), str(study.root), str(tmp_path)]
-    subprocess.run(
-        [sys.executable, "-c", DRAW_ALL, *arguments], check=True, env=environment, cwd=ROOT
-    )
-    for name in declarations():
-        job = study.job(name)
-        files = {kind: tmp_path / f"own.{kind}" for kind in job.outputs}
-        job.artifact.perform(job.settings, job.inputs, files)
-        for kind, file in files.items():
-            assert file.read_bytes() == (tmp_path / f"{name}.{kind}").read_bytes(), name
 
 
 def test_a_missing_file_is_named(study, figure_name, tmp_path):
@@ -287,7 +244,7 @@ def test_full_order_runs_with_any_number_of_iterations_are_the_crosses_of_one_cu
     (ax,) = figure.axes
     assert any(list(line.get_xdata()) == [4.0, 4.0] for line in ax.lines)
     assert 4.5 not in {float(x) for line in ax.lines for x in line.get_xdata()}
-    runs, _ = [line for line in ax.lines if line.get_marker() == "X"]
+    (runs,) = (line for line in ax.lines if line.get_marker() == "X")
     assert list(runs.get_xdata()) == pytest.approx([0.8, 4.0, 16.0])
     *_, front, _ = [line for line in ax.lines if line.get_color() == view.FAMILIES[view.COARSE]]
     assert front.get_xydata().tolist() == [[0.1, 0.04], [0.3, 0.03]]
@@ -327,40 +284,23 @@ def test_a_speedup_that_is_doubtful_has_another_mark():
     assert [t.get_text() for t in same.get_xticklabels()] == ["a, 400", "a, 8,000"]
 
 
-def test_a_scene_without_effects_ends_at_the_tick(study):
-    shares = [(s, "gravity", 1.0, 1.0, None, None) for s in ("strain_oop", "cloth_all")]
-    left_out = [("gravity", 3, 3.5), ("a + b", 1, 2.0), ("nothing", 3, 4.0)]
-    shares += [("cloth_all", name, 4.0 - ms, None, groups, ms) for name, groups, ms in left_out]
-    table = frame("scene effect ms_per_frame share groups without_ms", *shares)
-    figure = study.draw("effects_cost", {"table": table}, scenes=("strain_oop", "cloth_all"))
-    shares, without = figure.axes
-    assert [t.get_text() for t in shares.get_yticklabels()] == ["strain oop", "cloth all"]
-    assert [t.get_text() for t in without.get_yticklabels()] == [
-        "whole", "without gravity", "without a + b",
-    ]  # fmt: skip
-    assert [bar.get_width() for bar in without.patches] == [4.0, 3.5, 2.0]
-    assert [line.get_xdata()[0] for line in without.lines] == [3.5, 2.0]
-
-
 def test_every_method_has_a_family():
     methods = load_methods(CONFIG / "methods.yaml")
     reductions = {m: Reduction(title=spec.title, rows=spec.rows) for m, spec in methods.items()}
-    everything = Drawn(experiments=(), reductions=reductions, groups=())
+    everything = Drawn(experiments=(), reductions=reductions)
     families = {name: view.look_of(name, "full", everything)[0] for name in everything.methods}
     assert set(families.values()) <= {*view.FAMILIES} - {view.ITERATIONS}
     assert view.look_of("ecsw-1e-02", "pod", everything)[0] == view.WEIGHTED
 
 
-def invented(errors, times, method="deim", blown_up=(), position_basis="full"):
+def invented(errors, times, blown_up=()):
     """Points of one scene, of one method that samples single entries."""
-    names = {"scene": "a", "method": method, "position_basis": position_basis}
+    names = {"scene": "a", "method": "deim", "position_basis": "full", "number": 0, "marker": "o"}
     names |= {"family": view.ENTRIES, "member": "deim"}
     points = pd.DataFrame({view.ERROR: errors, view.TIME: times})
-    points["iterations"] = points.index + 1
     lost = pd.DataFrame({view.ERROR: np.nan, view.TIME: blown_up})
-    marker = {(view.ENTRIES, "deim"): "o"}
-    own = {"a": 2.0}, {"a": 0.1}
-    return view.TradeOffs(points.assign(**names), lost.assign(**names), *own, marker)
+    own = pd.DataFrame({view.TIME: [2.0], "mesh_error": [0.1]}, index=["a"])
+    return view.TradeOffs(points.assign(**names), lost.assign(**names), own)
 
 
 def drawn(ax, marker):

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from pdrom.core.errors import StorageError
 from pdrom.model.mesh.generators import bar, cloth
-from pdrom.reduction.sampling.deim import block_elements, deim_entries
+from pdrom.reduction.sampling.deim import deim_entries
 from pdrom.view.camera import Camera
 from study.artifact.paths import RERUNS, TRAIN
 from study.figures.kit.elements import element_map, magnitudes, signed_entry
@@ -73,7 +73,7 @@ def test_the_signed_entry_is_the_largest():
 def test_residuals_are_those_of_deim():
     V = np.linalg.qr(np.random.default_rng(3).standard_normal((60, 6)))[0]
     entries = deim_entries(V)
-    for step in iterations(V, entries, 2, "scalar", 6):
+    for step in iterations(V, entries, 2, 6):
         coefficients = np.zeros(0)
         picked = entries[: step.k - 1]
         if len(picked):
@@ -85,26 +85,9 @@ def test_residuals_are_those_of_deim():
         assert list(step.earlier) == [e // 6 for e in picked]
 
 
-def test_residuals_of_blocks_and_joint_rows():
-    V = np.linalg.qr(np.random.default_rng(4).standard_normal((60, 5)))[0]
-    elements = block_elements(V, 6)
-    block = (6 * elements[:, None] + np.arange(6)).ravel()
-    steps = iterations(V, block, 2, "element", 5)
-    assert [step.newest for step in steps] == list(elements)[:5]
-    # the picked element is the darkest
-    assert [np.argmax(step.magnitude) for step in steps] == list(elements)[:5]
-    joint = iterations(V, 3 * np.array([4, 11, 0]), 2, "joint", 5)
-    assert [step.newest for step in joint] == [2, 5, 0]
-    # row 4 was sampled on every axis: after the first step nothing is left there
-    second = joint[1].magnitude[2]
-    other = V.reshape(-1, 3, 5)[5]
-    coefficient = V.reshape(-1, 3, 5)[4, :, 1] / V.reshape(-1, 3, 5)[4, :, 0]
-    assert second == pytest.approx(np.linalg.norm(other[:, 1] - coefficient * other[:, 0]))
-
-
 def test_entries_outside_the_basis_are_refused():
     with pytest.raises(StorageError, match="do not fit"):
-        iterations(np.eye(12)[:, :2], np.array([3, 12]), 2, "scalar", 2)
+        iterations(np.eye(12)[:, :2], np.array([3, 12]), 2, 2)
 
 
 def test_instants_may_be_shares_of_the_first_frames(study):
@@ -127,6 +110,5 @@ def test_runs_are_read_only_where_finite(study):
     entry, positions = infos[r].at(15)
     assert entry == BLOWUP_FRAME - 1
     assert np.isfinite(positions).all()
-    assert infos[20].at(15) is None
     assert [i.r for i in choose_ranks(list(infos.values()), ("full", 14, 6, 99))] == [14, 6]
     assert choose_ranks(list(infos.values()), (99,)) == list(infos.values())
