@@ -119,14 +119,14 @@ def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
 def _drawn(study: Study, labels: Labels) -> Drawn:
     """Scenes and methods that a figure names, or else those of the study that fit the figure."""
     figure = declarations()[labels["figure"]]
+    groups = {*figure.groups.split()}
     fitting = [
         name
         for name, config in study.scenes.items()
-        if len(config.reduce) > figure.several
-        and not (figure.groups and {*figure.groups}.isdisjoint(config.reduce))
+        if len(config.reduce) > figure.several and not (groups and groups.isdisjoint(config.reduce))
     ]
-    scenes = [name for name in figure.scenes if name in study.scenes] or fitting
-    methods = [name for name in figure.methods if name in study.methods] or study.methods
+    scenes = [name for name in figure.scenes.split() if name in study.scenes] or fitting
+    methods = [name for name in figure.methods.split() if name in study.methods] or study.methods
     found = [(name, study.scenes[name]) for name in scenes]
     specs = [(name, study.methods[name]) for name in methods]
     return Drawn(

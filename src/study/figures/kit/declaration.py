@@ -219,16 +219,16 @@ class Declaration(Artifact):
     title, caption : text in the mark-up of `study.artifact.markup`; ``{key}`` in a caption stands
         for the value of a setting
     number : number of the figure of the preprint that this one reproduces; None if there is none
-    scenes, methods : names in the order of drawing, as far as the study has them; of a study that
-        has none of them its own methods, and its scenes that fit:
+    scenes, methods : names in the order of drawing, separated by blanks, as far as the study has
+        them; of a study that has none of them its own methods, and its scenes that fit:
     groups, several : those that reduce one of ``groups`` (any group if empty), or several groups
     """
 
     caption: str = ""
     number: int | None = None
-    scenes: Sequence[str] = ()
-    methods: Sequence[str] = ()
-    groups: Sequence[str] = ()
+    scenes: str = ""
+    methods: str = ""
+    groups: str = ""
     several: bool = False
     rule_pattern = "figure_{}"
 
@@ -258,16 +258,14 @@ class Declaration(Artifact):
 
 
 def figure(
-    *, title: str, reads: Mapping[str, Read], number: int | None = None, more: str = "",
-    scenes: str = "", methods: str = "", groups: str = "", several: bool = False,
-    timed: bool = False,
-) -> Callable[[Callable[..., Figure]], Declaration]:  # fmt: skip
+    *, title: str, reads: Mapping[str, Read], more: str = "", timed: bool = False, **fields: Any
+) -> Callable[[Callable[..., Figure]], Declaration]:
     """Return a decorator that declares a function as the drawing of a figure.
 
     The function gets the inputs ``reads``. If it has a parameter ``drawn``, it gets what the figure
-    draws of the study, by the names (separated by blanks) in ``scenes``, ``methods``, ``groups``.
-    The caption is the docstring of the function followed by ``more``; line breaks count as blanks.
-    A ``timed`` figure draws times, and says so if they are unreliable.
+    draws of the study, by ``fields`` of `Declaration`. The caption is the docstring of the function
+    followed by ``more``; line breaks count as blanks. A ``timed`` figure draws times, and says so
+    if they are unreliable.
 
     Raises TypeError if the docstring is missing, or if the parameters do not match ``reads``.
     """
@@ -277,12 +275,11 @@ def figure(
         if not function.__doc__:
             raise TypeError(f"figure {name}: the function has no docstring, which is its caption")
         drawn = {"drawn": Setting("drawn")} if "drawn" in function.__annotations__ else {}
+        writes = {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}
+        caption = " ".join([*function.__doc__.split(), *more.split()])
         made = Declaration(
-            name, title, {**drawn, **reads},
-            {"pdf": FIGURE.where(name=name), "png": FIGURE_PICTURE.where(name=name)}, function,
-            caption=" ".join([*function.__doc__.split(), *more.split()]), number=number,
-            scenes=scenes.split(), methods=methods.split(), groups=groups.split(), several=several,
-        )  # fmt: skip
+            name, title, {**drawn, **reads}, writes, function, caption=caption, **fields
+        )
         times = {TIMES: TableOf("frame_times")} if timed else {}
         return replace(declare(made), reads={**made.reads, **times})
 

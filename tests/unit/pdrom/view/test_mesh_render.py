@@ -10,7 +10,6 @@ from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.view import mesh_render
 from pdrom.view.camera import Camera, Window, bounds, window_of
-from pdrom.view.frames import frame_numbers
 from pdrom.view.panels import RunPanel, fit_aspect
 from places import CONFIG
 
@@ -60,13 +59,6 @@ def test_normals_are_unit_or_zero():
     assert np.allclose(normals, [[0, 0, 1], [0, 0, 0]])
 
 
-@pytest.mark.parametrize(("side", "expected"), [(5, False), (40, True)])
-def test_big_meshes_are_rasterised(side, expected):
-    mesh = cloth(side, side)
-    drawn = mesh_render.draw_surface(Figure().subplots(), mesh.points, mesh, Camera(), "grey")
-    assert bool(drawn.get_rasterized()) is expected
-
-
 def test_outline_of_sheet_and_bar():
     """Wherever they are; of the box its twelve edges, with 3 and twice 2 segments."""
     for mesh, count in ((cloth(4, 5), 2 * (3 + 4)), (bar(4, 3, 3), 4 * (3 + 2 + 2))):
@@ -111,7 +103,3 @@ def test_a_run_outside_is_seen_together_with_the_window():
     assert larger.left <= -1.0
     assert larger.right >= 9.0
     assert larger.width / window.width == pytest.approx(10.0 * 1.06 / 2.0)
-
-
-def test_instants_are_fractions_of_a_run():
-    assert frame_numbers((0.0, 0.1, 0.11, 1.0), 20) == [0, 2, 20]

@@ -60,8 +60,9 @@ class Invented:
         return Plan(self.study, Folders(str(self.root))).file(place, labels)
 
     def job(self, name: str, root: Path | None = None, **changes: object) -> Job:
-        """Job of a figure that is declared with ``changes``."""
-        figure = replace(declarations()[name], **changes)
+        """Job of a figure that is declared with other scenes or methods."""
+        names = {key: " ".join(value) for key, value in changes.items()}
+        figure = replace(declarations()[name], **names)
         with patch.dict(declarations(), {name: figure}):
             return Plan(self.study, Folders(str(root or self.root))).job(figure, {})
 

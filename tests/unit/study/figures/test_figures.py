@@ -19,7 +19,6 @@ from pdrom.reduction.method import load_methods
 from places import CONFIG
 from study.artifact.paths import RERUNS, SUBSPACES
 from study.figures import accuracy_cost as view
-from study.figures.gain import BESIDE
 from study.figures.kit.declaration import Drawn, Reduction, camera_of, declarations, write_figure
 from study.figures.runs import RANKS, Runs, obstacles_of
 from study.pipeline.study import Study
@@ -135,16 +134,6 @@ def test_starts_that_fail_are_counted_below_runs_on_bases_of_round_off(study):
     assert any("blew up at frame 0" in text for text in shown)
 
 
-def test_a_run_that_never_began_says_why(study):
-    assert any("round-off" in t for t in texts(study.draw("strain_runs", scenes=("bend_fall",))))
-    figure = runs(study, "spring_runs", "spring_stretch", ranks=(6, 20))
-    assert any("exceeds" in text for text in texts(figure))
-    # sizes that ran are drawn once
-    for rank in (6, 14, "full"):
-        figure = runs(study, "spring_runs", "spring_stretch", ranks=(rank,), methods=("deim",))
-        assert len(figure.axes) == 2
-
-
 def test_a_run_out_of_view_is_drawn_to_a_stated_scale(small_study):
     study = small_study(["spring_twist"], ["deim-joint"])
     path = study.path(RERUNS, "spring_twist", "spring", "deim-joint")
@@ -223,13 +212,6 @@ def test_the_horizon_is_the_first_frame_above_the_threshold(study):
     # 10^(-9 + f/2) exceeds 1e-3 first at f = 13
     assert "spring twist: 13" in texts(figure)
     assert "strain oop: beyond 20" in texts(figure)
-
-
-@pytest.mark.parametrize("name", ["singular_values", "reconstruction_error"])
-def test_published_values_are_drawn_where_they_are_given(study, name):
-    for scene in ("bar_release", "spring_twist"):
-        shown = texts(study.draw(name, scenes=(scene,)))
-        assert any("published code's" in text for text in shown) == (scene in BESIDE)
 
 
 def test_full_order_runs_with_any_number_of_iterations_are_the_crosses_of_one_curve(study):

@@ -39,11 +39,6 @@ def test_elements_are_drawn_where_they_lie(group, mesh, kind):
         element_map(group, mesh, count + 1, "file")
 
 
-def test_what_has_no_elements_cannot_be_drawn():
-    with pytest.raises(StorageError, match="'gravity' has no elements"):
-        element_map("gravity", cloth(4, 4), 3, "file")
-
-
 def test_boundary_triangles_take_the_value_of_their_tetrahedron():
     mesh = bar(4, 3, 3)
     elements = element_map("tetrahedron_strain", mesh, len(mesh.tetrahedra), "file")
