@@ -7,17 +7,16 @@ import time
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from study.pipeline.progress import rounded
-
-NOTHING = "Nothing to be done"
+# Beginnings of messages that are printed: there are no jobs; why jobs would run.
+NEWS = ("Nothing to be done", "Reasons:")
 ENOUGH = 0.05  # share of the work in finished jobs that an estimate needs
 
 
 class LogHandler(LogHandlerBase):
     """Log handler that prints one line for each started or failed job, and Snakemake's warnings.
 
-    It prints to standard error. Snakemake's other messages are in its log only. In a dry run, no
-    jobs are printed.
+    It prints to standard error. Snakemake's other messages are in its log only. Of a dry run, it
+    prints the numbers of jobs and the reasons.
     """
 
     writes_to_stream = True
@@ -34,8 +33,9 @@ class LogHandler(LogHandlerBase):
     def emit(self, record: logging.LogRecord) -> None:
         """Print a ``record`` about a job or problem; update the estimate of remaining time."""
         event, text = getattr(record, "event", None), record.getMessage()
-        news = event is None and (record.levelno >= logging.WARNING or NOTHING in text)
+        news = event is None and (record.levelno >= logging.WARNING or text.startswith(NEWS))
         if event == LogEvent.RUN_INFO:
+            news = self.common_settings.dryrun and not self._total  # a dry run repeats it
             self._total = record.stats["total"]
         elif hasattr(record, "expected"):
             self._rest, self._begun = dict(record.expected), record.created
@@ -66,3 +66,13 @@ class LogHandler(LogHandlerBase):
         total = str(self._total)
         clock = time.strftime("%H:%M", time.localtime(record.created))
         sys.stderr.write(f"[{self._started:>{len(total)}}/{total}] {clock} {text}\n")
+
+
+def rounded(seconds: float) -> str:
+    """Return ``seconds`` as a rounded duration in words, such as "about 2.5 min"."""
+    minutes = seconds / 60
+    if minutes < 1:
+        return "less than a minute"
+    if minutes < 90:
+        return f"about {round(minutes) if minutes > 5 else round(2 * minutes) / 2:g} min"
+    return f"about {minutes / 60:.1f} h"

@@ -9,17 +9,14 @@ import io
 import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stderr, suppress
+from contextlib import contextmanager, redirect_stderr
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from yaml import YAMLError
-
-from pdrom.core.errors import INTERRUPTED, ConfigurationError, PdromError
-from pdrom.core.yamlfile import read_yaml, require_as_written, shown
+from pdrom.core.errors import INTERRUPTED, ConfigurationError, PdromError, reason
+from pdrom.core.yamlfile import read_yaml, shown
 from study.pipeline.folders import folders
-from study.pipeline.running import blocked
 
 # Options with which Snakemake only prints or draws something and runs no job.
 LOOKS_ONLY = (
@@ -43,7 +40,6 @@ class CommandLine:
 
     Raises ConfigurationError for a wrong option, or a target that was read as an option's value.
 
-    report : file given by the option ``--report``, None without the option
     looks_only : True if no job runs and no result is written
     plans : True for a dry run (``-n``) without any other option of `LOOKS_ONLY`
     makes : True if results are made or a dry run plans to; False with ``--touch``, too
@@ -59,7 +55,6 @@ class CommandLine:
         self.configfiles, self.settings, self.targets = (
             tuple(map(str, found[name] or ())) for name in ("configfile", "config", "targets")
         )
-        self.report = str(found["report"]) if found["report"] and reports else None
         self.looks_only = bool(looks) or reports
         self.plans = looks == ["dryrun"]
         self.makes = (self.plans or not self.looks_only) and not found["touch"]
@@ -68,9 +63,6 @@ class CommandLine:
         lines = self.makes and not own_output
         self.more = [*(() if cores else CORES), *(LINES if lines else ()), *OPTIONS]
         self.executor: str | None = found["executor"]
-        for key, _, text in (setting.partition("=") for setting in self.settings):
-            with suppress(YAMLError):  # Snakemake takes such a value as a text
-                require_as_written(text, "--config", key)
 
     @property
     def configuration(self) -> list[str]:
@@ -104,17 +96,6 @@ def parsed(arguments: Sequence[str]) -> dict[str, Any]:
         fault = said.getvalue().strip().rpartition("rror: ")[2]
     except Exception as error:
         fault = f"{' '.join(arguments)}: {error}"
-    else:
-        options = [word.partition("=")[0] for word in _before_targets(arguments)]
-        for begin in ("--config", "--configfile"):
-            if sum(option in (begin, f"{begin}s") for option in options) > 1:
-                fault = f"{begin} is given twice; write all values after the first"
-        for name in ("cores", "jobs"):
-            if isinstance(found[name], int) and found[name] < 1:
-                fault = f"--{name} {found[name]}: at least 1 is required"
-        for name in (found["configfile"] or ())[1:]:
-            if not Path(name).suffix:
-                fault = f"--configfile {name}: no YAML file"
     if fault:
         more = ".venv/bin/snakemake --help explains the options; write -- before targets"
         raise ConfigurationError(f"{fault} ({more})")
@@ -137,9 +118,6 @@ def completed(arguments: Sequence[str]) -> list[str]:
         others = [*arguments[:at], *arguments[at + 1 + len(named) :]]
         arguments = [*others, *([] if "--" in others else ["--"]), *map(figure_file, named or [""])]
     command = CommandLine(arguments)
-    if command.report and not command.configuration and recall():
-        sys.stderr.write(f"reproduce: a report of the last run, {' '.join(recall())}\n")
-        command = CommandLine(command.rewritten(recall(), {t: [t] for t in command.targets}))
     check_files(command.configfiles)
     own = folders(command.configfiles, command.settings)
     made = {target: files(target, own) for target in command.targets}
@@ -168,7 +146,7 @@ def one_line() -> Iterator[None]:
     except PdromError as error:
         sys.exit(f"pdrom: {error}")
     except OSError as error:
-        sys.exit(f"pdrom: {PdromError(blocked(error))}")
+        sys.exit(f"pdrom: {error.filename or 'a file'}: {reason(error)}")
     except KeyboardInterrupt:
         sys.stderr.write("pdrom: interrupted\n")
         sys.exit(INTERRUPTED)

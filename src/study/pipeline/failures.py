@@ -3,29 +3,14 @@
 import logging
 import re
 import signal
-import sys
-import threading
 from pathlib import Path
 from typing import NoReturn
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from pdrom.core.errors import PdromError
-from study.pipeline.fork_server import GONE
 from study.pipeline.signals import KEPT, ending, handle
 
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (.*)$", re.MULTILINE)
-_ENDING = re.compile(r"died with <Signals\.\w+: (\d+)|exit status (\d+)")
-
-
-def cause(said: str) -> str:
-    """Return how a job ended that wrote no error, from Snakemake's message ``said`` about it."""
-    if not (found := _ENDING.search(said)):
-        return " ".join(said.split()) or "it ended without an error message"
-    number = int(found[1] or int(found[2]) - 128)
-    known = number in {*signal.Signals}
-    how = f"ended by {signal.Signals(number).name}" if known else f"exit status {found[2]}"
-    return f"{how}: out of memory?" if number in (signal.SIGKILL, GONE - 128) else how
 
 
 class Failures(logging.Handler):
@@ -42,7 +27,7 @@ class Failures(logging.Handler):
         """Store the failed job, failed batch or error that a ``record`` reports."""
         event = getattr(record, "event", None)
         if event == LogEvent.ERROR:
-            self._said[record.thread] = record.getMessage()
+            self._said[record.thread] = " ".join(record.getMessage().split())
         elif event == LogEvent.GROUP_ERROR:
             log = next(iter(record.aux_logs), "")
             last = written(log).strip().rpartition("\n")[2]
@@ -53,7 +38,7 @@ class Failures(logging.Handler):
                 self._lines.append(f"job {record.rule_name} failed: {errors[-1]}")
             elif not record.indent:  # all jobs of a failed batch are indented, finished ones, too
                 made = f"job {record.rule_name} failed while making {record.output[0]}"
-                self._lines.append(f"{made}: {cause(said or record.rule_msg or '')} (log: {log})")
+                self._lines.append(f"{made}: {said} (log: {log})")
 
     def interrupt(self, number: int, _frame: object = None) -> NoReturn:
         """Handler of the signal ``number``: let Snakemake cancel its jobs and end the run."""
@@ -72,13 +57,3 @@ def written(log: str) -> str:
     """Text of the file ``log``, which Snakemake removes when it starts a job; "" without one."""
     path = Path(log)
     return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
-
-
-def plain(record: logging.LogRecord) -> bool:
-    """Filter of Snakemake's log: an error outside of jobs becomes one line, without a traceback."""
-    error = sys.exc_info()[1]
-    outside = threading.current_thread() is threading.main_thread()
-    if getattr(record, "event", None) == LogEvent.ERROR and error and outside:
-        line = " ".join(f"{type(error).__name__}: {error}".split())
-        record.msg, record.args = f"pdrom: {PdromError(line[:600])} (--verbose shows more)", ()
-    return True

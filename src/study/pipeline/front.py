@@ -29,15 +29,10 @@ def main() -> None:
         command = [*HANDED_ON[sys.argv[1]], *sys.argv[2:]]
         os.execvp(command[0], command)
     sys.stderr.write("reproduce: planning\n")
-    from logging import getLogger
-
     from study.pipeline.commandline import completed, one_line
-    from study.pipeline.failures import plain
 
     with one_line():
         sys.argv = ["snakemake", *completed(sys.argv[1:])]
-    if "--verbose" not in sys.argv:
-        getLogger("snakemake.logging").addFilter(plain)
     from snakemake.cli import main as snakemake
 
     snakemake(sys.argv[1:])

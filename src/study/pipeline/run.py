@@ -6,14 +6,14 @@ import logging
 import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from snakemake.scheduling.job_scheduler import JobScheduler
 
-from pdrom.core.errors import ConfigurationError, PdromError, StorageError
+from pdrom.core.errors import PdromError, StorageError
 from pdrom.core.store import read_table, write_text
 from pdrom.core.store.checksum import move_aside
+from snakemake_logger_plugin_pdrom import rounded
 from study.artifact import planned
 from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, remember
@@ -22,7 +22,6 @@ from study.pipeline.fingerprint import memory
 from study.pipeline.fork_server import SUPPORTED, start_server
 from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
-from study.pipeline.progress import Preview
 from study.pipeline.scenes import Coarsen
 from study.pipeline.signals import handle, leave
 from study.pipeline.summary import CONTENTS, contents, summary
@@ -44,18 +43,14 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
     return lambda log: float(known.get(kind_of(log, plan.results), usual))
 
 
-def tell_expectation(workflow: Any, plan: Plan) -> None:
-    """Log the expected work of every job of ``workflow`` for the progress lines of a run."""
+def expected_work(workflow: Any, plan: Plan) -> dict[int, float]:
+    """Map the number of each job that ``workflow`` runs to its expected seconds, times its cores.
+
+    Rules without a log only collect targets and take no time.
+    """
     dag, seconds_of = workflow.dag, expected_seconds(plan)
-    expected = {
-        dag.jobid(job): seconds_of(str(job.log[0])) * job.threads
-        for job in dag.jobs
-        if dag.needrun(job) and job.log
-    }
-    logging.getLogger("snakemake.logging").info(
-        f"Jobs take {sum(expected.values()):.0f} s on one core where they were measured.",
-        extra={"expected": expected},
-    )
+    jobs = [job for job in dag.jobs if dag.needrun(job) and job.log]
+    return {dag.jobid(job): seconds_of(str(job.log[0])) * job.threads for job in jobs}
 
 
 class Run:
@@ -75,16 +70,12 @@ class Run:
         logging.getLogger("snakemake.logging").addHandler(self.failures)
 
     def check(self, plan: Plan, workflow: Any, cores: int) -> None:
-        """Check that requested targets and report can be made; let a dry run print a list of jobs.
+        """Check that requested targets can be made; let a dry run say how long it would take.
 
         Results that do not fit ``plan`` (see `faults`) are made again; a run sets those aside that
-        are damaged or another's. Raises ConfigurationError if target or report cannot be made.
+        are damaged or another's. Raises ConfigurationError if a target cannot be made.
         """
         check_targets(plan, self.command.targets, list(workflow.rules))
-        reports = self.command.report and not self.command.targets
-        file = plan.folders.manuscript
-        if reports and not Path(file).is_file():
-            raise ConfigurationError(f"report: this configuration has no {file}; run it first")
         found = faults(plan, self.command.targets) if self.command.makes else {}
         for path, fault in found.items():
             if fault in UNUSUAL:
@@ -92,9 +83,13 @@ class Run:
                 sys.stderr.write(f"pdrom: {path}: {fault}{aside}; it is made again\n")
         force(workflow, found)
         if self.command.plans:
-            preview = Preview(expected_seconds(plan), cores, found)
-            logging.getLogger("snakemake.logging").addHandler(preview)
-            atexit.register(lambda: sys.stdout.write(preview.text()))
+
+            def forecast() -> None:
+                if work := expected_work(workflow, plan):
+                    seconds, s = sum(work.values()) / cores, "s" * (cores > 1)
+                    sys.stdout.write(f"pdrom: {rounded(seconds)} on {cores} core{s}\n")
+
+            atexit.register(forecast)
 
     def start(self, workflow: Any, plan: Plan) -> None:
         """Log the expected times of jobs, and start the fork server if jobs run on this machine."""
@@ -102,7 +97,11 @@ class Run:
         # again: at the end of a run, timers use a third of a core, and the process waits for them.
         workflow.scheduler.job_rate_limiter = None
         memory().save()  # a signal ends a run at once
-        tell_expectation(workflow, plan)
+        expected = expected_work(workflow, plan)
+        logging.getLogger("snakemake.logging").info(
+            f"Jobs take {sum(expected.values()):.0f} s on one core where they were measured.",
+            extra={"expected": expected},
+        )
         with one_line():
             write_text(json.dumps(planned.plan()), planned.PLAN, with_checksum=False)
         os.environ[planned.KEPT] = str(planned.PLAN.absolute())

@@ -4,25 +4,17 @@ Snakemake's own lock consists of files, which a killed run leaves behind: a proc
 operating system's lock deletes them.
 """
 
-import errno
 import fcntl
 import os
 import shutil
 import socket
 from pathlib import Path
 
-from pdrom.core.errors import PdromError, reason
+from pdrom.core.errors import PdromError
 
 FOLDER = Path(".snakemake")
 LOCK = FOLDER / "run.lock"
 SNAKEMAKE_LOCKS = FOLDER / "locks"
-
-
-def blocked(error: OSError) -> str:
-    """Return what the operating system refused, and what to do about it."""
-    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-    do = "make room" if full else "remove what stands there, or make it writable"
-    return f"{error.filename or 'a file'}: {reason(error)}; {do}"
 
 
 def hold() -> int:

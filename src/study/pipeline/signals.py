@@ -4,7 +4,9 @@
 """
 
 import os
+import shutil
 import signal
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from typing import NoReturn
@@ -22,6 +24,8 @@ def leave(number: int, _frame: object = None) -> NoReturn:
     """Handler of the signal ``number``: end this process with one line, and so the fork server."""
     with suppress(OSError):  # nobody may read the stream any more; sys.stderr may be redirected
         os.write(2, ending(number).encode())
+    if "multiprocessing.util" in sys.modules:  # the folder with the socket of the fork server
+        shutil.rmtree(sys.modules["multiprocessing.util"].get_temp_dir(), ignore_errors=True)
     os._exit(128 + number)
 
 

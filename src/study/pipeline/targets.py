@@ -3,7 +3,7 @@
 A target is the number or name of a figure, the name of a table or of a rule, or a path.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,6 @@ from study.figures.kit.declaration import declarations
 from study.paper.source import figure_numbers
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
-from study.pipeline.scenes import scene_names
-from study.pipeline.study import Study
 from study.tables import declared
 
 PREPRINT = "preprint:"
@@ -49,28 +47,12 @@ def files(target: str, folders: Folders) -> list[str]:
     return found or [target]
 
 
-def check_targets(plan: Plan, targets: Iterable[str], rules: Sequence[Any]) -> None:
+def check_targets(plan: Plan, targets: Iterable[str], rules: Iterable[Any]) -> None:
     """Raise ConfigurationError if none of Snakemake's ``rules`` makes one of ``targets``."""
-    own = {rule.name for rule in rules if not rule.has_wildcards()}
-    for target in {*targets} - own:
-        if not any(rule.is_producer(target) for rule in rules):
-            known = [*plan.own_files, *plan.figures, *plan.tables, *own]
+    for target in targets:
+        if not any(target == rule.name or rule.is_producer(target) for rule in rules):
+            known = [*plan.own_files, *plan.figures, *plan.tables, *(rule.name for rule in rules)]
             raise ConfigurationError(
                 f"target '{target}': nothing makes it in this study{suggestion(target, known)}; "
-                "targets are names of figures and tables, and files, as "
-                f"{paths.FULL_ORDER.at(plan.results, scene='SCENE', run='train')}"
+                "targets are files, and names of figures and tables"
             )
-        for _, labels in paths.labels_in(target, plan.results):
-            for label, allowed in _allowed(plan.study, labels):
-                if label in labels and labels[label] not in allowed:
-                    what = f"unknown {label} '{labels[label]}'{suggestion(labels[label], allowed)}"
-                    raise ConfigurationError(f"target '{target}': {what}")
-
-
-def _allowed(study: Study, labels: Mapping[str, str]) -> Iterator[tuple[str, Collection[str]]]:
-    """Yield the labels of a path that are restricted, scenes first, with their allowed values."""
-    yield "scene", {*scene_names(study.root), *study.scenes}
-    yield "method", study.methods
-    yield "basis", {spec.basis_id for spec in study.methods.values()}
-    yield "mesh", study.every_mesh if "mesh" in labels else ()
-    yield "group", study.scene(labels["scene"]).reduce if "group" in labels else ()

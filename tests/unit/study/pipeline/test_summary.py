@@ -9,11 +9,11 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
+from study.pipeline.progress import Preview
 
 from pdrom.core.store import write_table
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
-from study.pipeline.progress import Preview
 from study.pipeline.summary import processor_seconds, summary
 
 FIGURES = ("results/figures/a.pdf", "results/figures/b.pdf")

@@ -1,0 +1,80 @@
+"""Start of jobs as forks of a process in which the libraries are already loaded.
+
+Snakemake executes a script in a thread of the run. This thread starts a process by Python's fork
+server (`multiprocessing`) and waits for its end (docs/decisions/0005-fork-server.md).
+"""
+
+import fcntl
+import multiprocessing
+import os
+import runpy
+import signal
+import subprocess
+import sys
+from multiprocessing import forkserver
+from multiprocessing.connection import wait
+from threading import Lock
+from typing import Any, cast
+
+from snakemake.script import PythonScript
+
+from study.artifact import planned
+
+# On macOS, forks of a process that has loaded system frameworks are unsafe.
+SUPPORTED = sys.platform == "linux"
+# `multiprocessing` starts and collects processes in one thread at a time.
+_ONE_AT_A_TIME = Lock()
+
+
+def start_server(preloaded: str = "study.pipeline.preloaded") -> None:
+    """Start the fork server, which imports ``preloaded``, and let Snakemake use `run_script`.
+
+    A script in a container is left to Snakemake.
+    """
+    if SUPPORTED:
+        multiprocessing.set_forkserver_preload([preloaded])
+        forkserver.ensure_running()
+    own = PythonScript.execute_script
+
+    def execute(script: Any, name: str, edit: bool = False) -> None:
+        if script.container_img is None:
+            run_script(os.path.abspath(name))
+        else:
+            own(script, name, edit)
+
+    PythonScript.execute_script = execute
+
+
+def run_script(script: str) -> None:
+    """Run the file ``script`` in a fork of the server; without a server, in a new interpreter.
+
+    Raises CalledProcessError with the exit status, or the negative number of the signal, of a
+    script that fails, as `subprocess` does.
+    """
+    if not SUPPORTED:
+        subprocess.run([sys.executable, "-m", planned.__name__, script], check=True)
+        return
+    job = multiprocessing.get_context("forkserver").Process(target=_run_as_main, args=[script])
+    with _ONE_AT_A_TIME:
+        job.start()
+    wait([job.sentinel])
+    with _ONE_AT_A_TIME:
+        job.join()
+        status = job.exitcode
+        job.close()
+    if status:
+        raise subprocess.CalledProcessError(status, script)
+
+
+def _run_as_main(script: str) -> None:
+    """Run ``script`` as a main program, in a process group that ends with the run."""
+    os.setpgid(0, 0)
+    run = cast(int, cast(Any, multiprocessing.parent_process()).sentinel)
+    # the system kills the group when the run closes its end of this pipe, however it ends
+    fcntl.fcntl(run, fcntl.F_SETOWN, -os.getpid())
+    fcntl.fcntl(run, fcntl.F_SETSIG, signal.SIGKILL)
+    fcntl.fcntl(run, fcntl.F_SETFL, os.O_ASYNC)
+    if wait([run], timeout=0):  # it has ended before
+        os._exit(1)
+    sys.argv, sys.path[0] = [script], os.path.dirname(script)
+    runpy.run_path(script, run_name="__main__")

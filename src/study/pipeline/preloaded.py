@@ -1,0 +1,29 @@
+"""What the fork server loads before it forks jobs: an import of this module loads it.
+
+These are libraries that most jobs or all figures use, modules that every job imports first, and the
+modules of the experiment with the most jobs.
+"""
+
+import gc
+import os
+from importlib import import_module
+
+from study.artifact.planned import import_planned
+
+LIBRARIES = (
+    "h5py", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "numpy",
+    "pandas", "study.artifact.logs", "pdrom.core.provenance", "study.experiments.kit.base",
+    "study.experiments.reruns", "pydantic", "scipy.linalg", "scipy.sparse.linalg",
+    "snakemake.cli", "snakemake.iocontainers", "snakemake.script", "threadpoolctl", "yaml",
+)  # fmt: skip
+
+os.setpgid(0, 0)  # keys such as Ctrl-C are for the run
+import_planned()
+for library in LIBRARIES:
+    import_module(library)
+# register numba's own functions once, which otherwise every fork would do
+target = import_module("numba.core.registry").cpu_target
+target.typing_context.refresh()
+target.target_context.refresh()
+gc.collect()
+gc.freeze()
