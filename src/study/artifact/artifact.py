@@ -26,11 +26,10 @@ from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, TypeAdapter
 
-from pdrom.core.errors import PdromError
 from pdrom.core.provenance import made_by
 from pdrom.core.store.checksum import digest_told
 from study.artifact.paths import Place
-from study.artifact.planned import SCRIPT, plan, refused
+from study.artifact.planned import plan
 from study.artifact.reads import EditedFiles, FileRead, Labels, Read, SettingRead, Sources, listed
 
 A = TypeVar("A", bound="Artifact")
@@ -134,19 +133,13 @@ def make(
 ) -> None:
     """Run a job of the artifact at ``address``; its files record rule, settings, code and inputs.
 
-    Raises StorageError if an input is damaged or belongs to another result (`damaged_set_aside`),
-    and PdromError if a file that the job reads was edited since the plan of the run.
-
+    Raises StorageError if an input is damaged or belongs to another result (`damaged_set_aside`).
     The other arguments are attributes of a `study.pipeline.plan.Job`.
     """
     made: Artifact = resolve_name(address)
     digests = map(digest_told, made.paths(job["inputs"], edited=False))
-    try:
-        with recorded(made, job["settings"], labels, code, content, digests):
-            made.perform(**job)
-    finally:
-        for message in refused([SCRIPT, *made.paths(job["inputs"], edited=True)]):
-            raise PdromError(message)
+    with recorded(made, job["settings"], labels, code, content, digests):
+        made.perform(**job)
 
 
 def declare(made: A, *parameters: str) -> A:
@@ -165,7 +158,7 @@ def declared_in(package: str, kind: type[A]) -> dict[str, A]:
     # to save time, modules that import nothing from the module of ``kind`` are not imported
     above, _, own = kind.__module__.rpartition(".")
     needed = f"\nfrom {kind.__module__} import ", f"\nfrom {above} import {own}"
-    for name, (_, text) in plan()[0].items():
+    for name, (_, text) in plan().items():
         if not name.startswith(f"{package}.") or not any(line in text for line in needed):
             continue
         module = import_module(name)

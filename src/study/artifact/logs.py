@@ -39,13 +39,8 @@ def job_log(path: str) -> Iterator[logging.Logger]:
     start = time.monotonic()
     loggers = [logging.getLogger(name) for name in PACKAGES]
     logger = loggers[0]
-    try:
-        Path(path).parent.mkdir(parents=True, exist_ok=True)
-        handler = logging.FileHandler(path, mode="w", encoding="utf-8")
-    except OSError as error:
-        sys.exit(f"pdrom: {path}: cannot be written ({error.strerror})")
-    # on a full disk the job fails anyway when it writes its outputs
-    handler.handleError = lambda record: None  # type: ignore[method-assign]
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    handler = logging.FileHandler(path, mode="w", encoding="utf-8")
     handler.setFormatter(logging.Formatter(FORMAT))
     previous = [each.level for each in loggers]
     for each in loggers:

@@ -2,24 +2,21 @@
 
 import logging
 import re
-import signal
 from pathlib import Path
-from typing import NoReturn
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from study.pipeline.signals import KEPT, ending, handle
+from study.pipeline.signals import KEPT
 
 _ERROR = re.compile(r"^[-0-9]+ [0-9:,]+ ERROR +pdrom: (.*)$", re.MULTILINE)
 
 
 class Failures(logging.Handler):
-    """Log handler that collects failed jobs, failed batches, and interruptions of a run."""
+    """Log handler that collects failed jobs and failed batches of a run."""
 
     def __init__(self) -> None:
         super().__init__(logging.INFO)
         self._lines: list[str] = []
-        self._stopped: int | None = None
         # thread -> its last error message: Snakemake logs the cause before it names the failed job
         self._said: dict[int | None, str] = {}
 
@@ -40,17 +37,9 @@ class Failures(logging.Handler):
                 made = f"job {record.rule_name} failed while making {record.output[0]}"
                 self._lines.append(f"{made}: {said} (log: {log})")
 
-    def interrupt(self, number: int, _frame: object = None) -> NoReturn:
-        """Handler of the signal ``number``: let Snakemake cancel its jobs and end the run."""
-        handle(signal.SIG_IGN)
-        self._stopped = number
-        raise KeyboardInterrupt
-
-    def end(self) -> tuple[str, int]:
-        """Return the last lines of a failed run, with each failed job's error, and exit status."""
-        if self._stopped:  # jobs that failed meanwhile were ended, too
-            return ending(self._stopped), 128 + self._stopped
-        return "".join(f"pdrom: {line}\n" for line in dict.fromkeys([*self._lines, KEPT])), 1
+    def text(self) -> str:
+        """Return the last lines of a failed run: each failed job with its error."""
+        return "".join(f"pdrom: {line}\n" for line in dict.fromkeys([*self._lines, KEPT]))
 
 
 def written(log: str) -> str:

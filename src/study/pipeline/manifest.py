@@ -1,10 +1,8 @@
 """The manifest of a study: a list of its result files, with checksums and their origin.
 
-Every successful run writes it. Large files (HDF5) are not read again: they have only the BLAKE2b
-digest of their checksum, other files also a SHA-256. Equal results have equal manifests.
+Every successful run writes it, from the checksums of the files. Equal results have equal manifests.
 """
 
-import hashlib
 import json
 import os
 from collections.abc import Iterable
@@ -14,30 +12,21 @@ from typing import Literal
 from pdrom.core.errors import StorageError
 from pdrom.core.provenance import ORIGIN
 from pdrom.core.store import Condition, check_file, write_text
-from pdrom.core.store.checksum import Checksum, read_checksum
+from pdrom.core.store.checksum import read_checksum
 from pdrom.core.yamlfile import ConfigModel
 from study.artifact import paths
 from study.pipeline.plan import Plan
 
-LARGE = ".h5"
-_ENVIRONMENT = ("pdrom_version", "python_version", "library_versions")
-
 
 class Entry(ConfigModel):
-    """Description of a result file in the manifest: its size, digests and origin.
-
-    sha256 : None for an HDF5 file, or a file that was damaged before the manifest was written
-    environment : key of `Manifest.environments` for the software versions that made the file
-    """
+    """Description of a result file in the manifest: its size, digest and origin."""
 
     bytes: int
     blake2b: str
-    sha256: str | None = None
     made_by: str | None = None
     configuration_sha256: str | None = None
     code_sha256: str | None = None
     inputs_sha256: str | None = None
-    environment: str | None = None
 
     def fits(self, path: Path) -> bool:
         """Return whether content and origin of the file ``path`` agree with this entry."""
@@ -54,25 +43,24 @@ class Manifest(ConfigModel):
     """Entries of all result files.
 
     options : command-line options that name the configuration
-    environments : short key -> versions of the package, of Python and of libraries
     files : path of a file, relative to the folder of the manifest -> its entry
     """
 
-    format: Literal[1] = 1
+    format: Literal[2] = 2
     options: tuple[str, ...]
-    environments: dict[str, dict[str, str]]
     files: dict[str, Entry]
 
 
 def write_manifest(plan: Plan, options: Iterable[str]) -> None:
     """Write the manifest of a study after a successful run."""
-    environments: dict[str, dict[str, str]] = {}
     files = {}
     for path in sorted(plan.own_files):
         if checksum := read_checksum(path):
-            inside = os.path.relpath(path, plan.results)
-            files[inside] = _entry(Path(path), checksum, environments)
-    made = Manifest(options=tuple(options), environments=environments, files=files)
+            told = json.loads(checksum.provenance or "{}")
+            origin = {key: told[key] for key in ORIGIN if key in told and key != "file"}
+            entry = Entry(bytes=Path(path).stat().st_size, blake2b=checksum.digest, **origin)
+            files[os.path.relpath(path, plan.results)] = entry
+    made = Manifest(options=tuple(options), files=files)
     text = f"{made.model_dump_json(indent=1, exclude_none=True)}\n"
     write_text(text, paths.MANIFEST.at(plan.results))
 
@@ -86,18 +74,3 @@ def read_manifest(results: str) -> Manifest:
         return Manifest.model_validate_json(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise StorageError(f"{path}: no manifest of this version of pdrom") from error
-
-
-def _entry(path: Path, checksum: Checksum, environments: dict[str, dict[str, str]]) -> Entry:
-    made = json.loads(checksum.provenance) if checksum.provenance else {}
-    made.pop("file", None)
-    environment = {name: made.pop(name) for name in _ENVIRONMENT if name in made}
-    if environment:
-        key = hashlib.sha256(json.dumps(environment, sort_keys=True).encode()).hexdigest()[:8]
-        environments[key] = environment
-        made["environment"] = key
-    if path.suffix != LARGE:
-        content = path.read_bytes()
-        if hashlib.blake2b(content).hexdigest() == checksum.digest:
-            made["sha256"] = hashlib.sha256(content).hexdigest()
-    return Entry(bytes=path.stat().st_size, blake2b=checksum.digest, **made)

@@ -170,11 +170,6 @@ class Plan:
         check_live(self.study)
         check_texts(self.study)
         scaled_methods(self.study, {})
-        for table in self.tables.values():
-            try:
-                self.job(table)
-            except ConfigurationError as error:
-                raise ConfigurationError(f"table {table.name} reads {error}") from error
         self.fixed  # noqa: B018 : resolving all jobs checks every figure and text
 
     @cached_property

@@ -4,13 +4,14 @@ import atexit
 import json
 import logging
 import os
+import signal
 import sys
 from collections.abc import Callable
 from typing import Any
 
 from snakemake.scheduling.job_scheduler import JobScheduler
 
-from pdrom.core.errors import PdromError, StorageError
+from pdrom.core.errors import PdromError
 from pdrom.core.store import read_table, write_text
 from pdrom.core.store.checksum import move_aside
 from snakemake_logger_plugin_pdrom import rounded
@@ -108,7 +109,7 @@ class Run:
         if workflow.local_exec:
             start_server()
         if not (workflow.local_exec and SUPPORTED):  # else the server ends all jobs with this run
-            handle(self.failures.interrupt)
+            handle(signal.default_int_handler)  # Snakemake then cancels its jobs
 
     def succeed(self, plan: Plan) -> None:
         """End a successful run: write overview and manifest; print the summary as last output."""
@@ -117,17 +118,13 @@ class Run:
             if not self.command.targets:
                 write_text(contents(self.command, plan), CONTENTS.at(plan.results))
             write_manifest(plan, self.command.configuration)
-            for path, fault in faults(plan, self.command.targets).items():
-                raise StorageError(f"{path}: {fault} since this run; the next run makes it again")
         except PdromError as error:
             atexit.register(sys.stderr.write, f"pdrom: {error}\n")
         atexit.register(sys.stderr.write, summary(self.command, plan))
 
     def fail(self) -> None:
-        """End a failed or interrupted run: exit and print the causes as last output."""
-        text, status = self.failures.end()
-        atexit.register(sys.stderr.write, text)
-        sys.exit(status)
+        """End a failed run: print the causes as last output."""
+        atexit.register(sys.stderr.write, self.failures.text())
 
 
 def start_batch(workflow: Any) -> None:

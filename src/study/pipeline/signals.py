@@ -9,7 +9,7 @@ import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from typing import NoReturn
+from typing import Any, NoReturn
 
 KEPT = "what is finished is kept, and the same command goes on from there"
 # Signals that end a run, and the words of its last line; its exit code is 128 plus the number.
@@ -29,7 +29,7 @@ def leave(number: int, _frame: object = None) -> NoReturn:
     os._exit(128 + number)
 
 
-def handle(handler: Callable[[int, object], None] | signal.Handlers) -> None:
+def handle(handler: Callable[[int, Any], Any] | signal.Handlers) -> None:
     """Install the ``handler`` of all signals in `ENDINGS` that nohup or a shell does not ignore."""
     for number in ENDINGS:
         if signal.getsignal(number) is not signal.SIG_IGN:

@@ -91,8 +91,6 @@ class Study:
         Raises ConfigurationError (with file, key, value, allowed values) if a setting is wrong.
         """
         self.root, self.configuration = root, configuration
-        if (file := root / "config" / "figures.yaml").exists():
-            raise ConfigurationError(f"{file}: delete it: figures declare what they draw")
         self.settings = settings = validate(StudySettings, config, source)
         self.titles: dict[str, str] = {}  # name of a scene -> title, for tables and figures
         self.sizes: dict[str, tuple[int, int]] = {}  # scene -> numbers of vertices and elements
@@ -152,16 +150,6 @@ class Study:
     def is_alone(self) -> bool:
         """Whether an own study leaves out what concerns others' scenes: it decides no claims."""
         return self.is_own and not self.settings.claim_sets
-
-    @property
-    def apart(self) -> str:
-        """Text on how this study differs from the full study; empty for the full study."""
-        if self.is_full:
-            return ""
-        coarsen = self.settings.coarsen
-        factors = {"coarse meshes": coarsen.resolution, "short runs": coarsen.frames}
-        kinds = [words for words, factor in factors.items() if factor < 1.0]
-        return f"of {' and '.join(kinds) or 'this configuration'}, not those of the study"
 
     @property
     def experiments(self) -> list[tuple[str, str]]:

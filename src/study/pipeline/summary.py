@@ -1,30 +1,35 @@
 """Texts about a finished run: the last lines it prints, and the overview results/contents.md.
 
-The overview lists every claim, figure and table, and the manuscript, with the command line that
-makes it. The columns of the tables follow.
+The overview lists every figure and table, and the manuscript, with the command line that makes it.
+The columns of the tables follow.
 """
 
 import shlex
 import time
-from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
 
 import psutil
 from snakemake.utils import available_cpu_count
 
-from pdrom.core.store import Condition, check_file, read_table
+from pdrom.core.store import read_table
 from study.artifact import paths
 from study.figures.kit.declaration import declarations
 from study.pipeline.commandline import CommandLine
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.targets import PREPRINT
-from study.tables.claims.rules import load_claims
-from study.tables.effects_cost import unreliable
 from study.tables.kit.declaration import Table
 
-TABLES_HEAD = """# Tables
+HEAD = """\
+# Contents
+
+Written by the run of {configuration}.
+With `-n`, a command says how many jobs and minutes an entry needs.
+
+| kind | name | command |
+|---|---|---|
+{entries}
+# Tables
 
 Tables are CSV with one row per observation, SI units unless a unit says otherwise, and an empty
 cell where there is no value.
@@ -34,15 +39,6 @@ machine differ (in `claims`, only in claims about times).
 own tolerance if it has one (docs/verification.md).
 """
 CONTENTS = paths.Place("contents.md")
-HEAD = """\
-# Contents
-
-Written by the run of {configuration}.
-With `-n`, a command says how many jobs and minutes an entry needs.
-
-| kind | name | command | as published | beyond |
-|---|---|---|---|---|
-"""
 
 
 def processor_seconds() -> float:
@@ -56,16 +52,16 @@ def processor_seconds() -> float:
 
 def summary(command: CommandLine, plan: Plan) -> str:
     """Return the last lines that a successful run prints, from its command line and its plan."""
-    folders, apart = plan.folders, plan.study.apart
+    folders = plan.folders
     wall = time.time() - psutil.Process().create_time()
     lines = [f"configuration: {configuration(command)}"]
     if command.targets:
         lines.append(f"made: {', '.join(command.targets)}")
     else:
-        if "claims" in plan.tables and (verdicts := verdicts_in(folders.results)):
-            words = f"as published / beyond; {apart}" if apart else "as published / beyond"
-            said = [f"{claim} {' / '.join(pair)}" for claim, pair in verdicts.items()]
-            lines.append(f"verdicts ({words}): {', '.join(said)}")
+        if "claims" in plan.tables:
+            verdicts = verdicts_in(folders.results).items()
+            said = [f"{claim} {' / '.join(pair)}" for claim, pair in verdicts]
+            lines.append(f"verdicts (as published / beyond): {', '.join(said)}")
         lines.append(f"manuscript: {', '.join(folders.documents.values())}")
         lines.append(f"as pages: {paths.ARTICLE.at(folders.results, name='index.html')}")
         for kind in ("figures", "tables"):
@@ -75,11 +71,6 @@ def summary(command: CommandLine, plan: Plan) -> str:
         lines.append("report: ./reproduce --report report.html")
     cores, used = available_cpu_count(), processor_seconds()
     lines.append(f"time: {minutes(wall)} on {cores} cores, {minutes(used)} of processor time")
-    times = Path(paths.TABLE.at(folders.results, name="frame_times"))
-    if times.is_file() and check_file(times) is Condition.INTACT and unreliable(read_table(times)):
-        lines.append(
-            "times: unreliable, other programs used the processor; none is in the manuscript"
-        )
     return "\n".join(f"pdrom: {line}" for line in lines) + "\n"
 
 
@@ -96,12 +87,9 @@ def configuration(command: CommandLine) -> str:
 
 
 def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
-    """Claim -> verdicts on the preprint's and on improved methods; {} if that table is damaged."""
-    path = paths.TABLE.at(results, name="claims")
-    # a damaged file is only ignored here: the next job that reads it renames it
-    if not Path(path).is_file() or check_file(path) is not Condition.INTACT:
-        return {}
-    table = read_table(path, ["claim", "verdict", "verdict_beyond"])
+    """Claim -> verdicts on the preprint's and on improved methods."""
+    columns = ["claim", "verdict", "verdict_beyond"]
+    table = read_table(paths.TABLE.at(results, name="claims"), columns)
     return {row.claim: (row.verdict, row.verdict_beyond) for row in table.itertuples()}
 
 
@@ -124,28 +112,20 @@ def _section(table: Table) -> str:
     return "\n".join(lines) + "\n"
 
 
-def entries(plan: Plan) -> Iterator[tuple[str, str, tuple[str, ...]]]:
-    """Yield kind, name and words for ``./reproduce`` of claims, figures, tables, the manuscript."""
-    for name in load_claims(Path("config/claims.yaml")) if "claims" in plan.tables else ():
-        yield "claim", name, ("claims",)
-    for name, figure in plan.figures.items():
-        yield "figure", name, ("figure", f"{PREPRINT}{figure.number}" if figure.number else name)
+def contents(command: CommandLine, plan: Plan) -> str:
+    """Return the text of results/contents.md after the run of ``command`` made all results."""
+    entries: list[tuple[str, str, tuple[str, ...]]] = [
+        ("figure", name, ("figure", f"{PREPRINT}{figure.number}" if figure.number else name))
+        for name, figure in plan.figures.items()
+    ]
     for name in plan.tables:
         # a name that a table and a figure share would request both: request this table by its path
         path = paths.TABLE.at(paths.RESULTS, name=name)
-        yield "table", name, (path if name in declarations() else name,)
-    yield "manuscript", Folders().manuscript, ()
-
-
-def contents(command: CommandLine, plan: Plan) -> str:
-    """Return the text of results/contents.md after the run of ``command`` made all results."""
-    verdicts, lines = verdicts_in(plan.results), []
-    for kind, name, words in entries(plan):
-        line = shlex.join(["./reproduce", *words, *command.configuration])
-        judged = verdicts.get(name, ("", "")) if kind == "claim" else ("", "")
-        lines.append(f"| {' | '.join((kind, name, f'`{line}`', *judged))} |\n")
-    head = HEAD.format(configuration=configuration(command)) + "".join(lines)
-    tables = plan.tables.values()
-    names = "\n".join(f"- [{table.name}](#{table.name}): {table.title}" for table in tables)
-    described = [TABLES_HEAD, f"{names}\n", *map(_section, tables)]
-    return "\n".join([head, *described])
+        entries.append(("table", name, (path if name in declarations() else name,)))
+    entries.append(("manuscript", Folders().manuscript, ()))
+    lines = [
+        f"| {kind} | {name} | `{shlex.join(['./reproduce', *words, *command.configuration])}` |\n"
+        for kind, name, words in entries
+    ]
+    head = HEAD.format(configuration=configuration(command), entries="".join(lines))
+    return "\n".join([head, *map(_section, plan.tables.values())])

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import pandas as pd
 
 from pdrom.core.errors import StorageError
+from pdrom.core.store import atomic_path, write_text
 from study.artifact.paths import RESULTS
-from study.pipeline.tracked import write_tracked
 from study.tables import declared
 from study.tables.kit.declaration import Table
 from study.verification.compare import kept
@@ -49,7 +49,8 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
     path, other = (folder / f"{table.name}{suffix}" for suffix in SUFFIXES)
     if len(content) > PACKED_BYTES:
         path, other, content = other, path, lzma.compress(content, preset=9)
-    write_tracked(path, content)
+    with atomic_path(path, with_checksum=False) as temporary:
+        temporary.write_bytes(content)
     other.unlink(missing_ok=True)
 
 
@@ -72,4 +73,5 @@ def note(folder: Path, reason: str, day: date, code: str) -> None:
     """Add ``day``, version of the code and reason of an update to the log in ``folder``."""
     path = folder / LOG
     text = path.read_text(encoding="utf-8") if path.is_file() else LOG_HEADER
-    write_tracked(path, f"{text}- {day:%Y-%m-%d}, code {code}: {reason}\n".encode())
+    line = f"- {day:%Y-%m-%d}, code {code}: {reason}\n"
+    write_text(text + line, path, with_checksum=False)
