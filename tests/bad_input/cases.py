@@ -313,7 +313,6 @@ OTHER_CASES = [
     other("method with a title in another script", METHODS, "title: POD projection",
           "title: \u6295\u5f71", "pod.title", "U+6295", "cannot be typeset"),
     other("method that is a number", METHODS, "pod: {", "7: {", "method 7", "letters"),
-    Case("choices of figures in a file", {"config/figures.yaml": "ladder: {}\n"}, ("delete it",)),
     override("choices of figures", "figures", {"ladder": {}}, "unknown key 'figures'"),
     Case("empty claims", {CLAIMS: ""}, (CLAIMS, "a mapping of claims is required")),
     other("claim by an unknown metric", CLAIMS, "metric: local_share", "metric: local_shar",

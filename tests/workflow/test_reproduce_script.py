@@ -7,7 +7,6 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,8 +17,8 @@ from places import ROOT
 from study.pipeline.signals import ENDINGS
 
 SCRIPT = ROOT / "reproduce"
-TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "getconf", "grep", "mkdir", "rm", "sed", "sh"]
-TOOLS += ["sleep", "tail", "touch", "tr", "uname"]
+TOOLS = ["cat", "chmod", "cksum", "cp", "dirname", "grep", "mkdir", "rm", "sed", "sh", "sleep"]
+TOOLS += ["tail", "touch", "tr"]
 PACKAGES = "lib/python3.12/site-packages"
 FRONT = "python -m study.pipeline.front"
 LOCK_FILE = f"nowhere==1.0 --hash=sha256:{64 * '0'}\n"
@@ -30,8 +29,6 @@ case "$*" in
 *print*version_info*) echo {version} ;;
 *"sys.exit(sys.version_info"*) exit {too_old} ;;
 *"import venv"*)
-    touch searching
-    while [ -e hold-search ]; do sleep 0.05; done
     exit {no_venv}
     ;;
 *fcntl*) exec "{real}" "$@" ;;
@@ -48,10 +45,6 @@ case "$*" in
     touch installing
     while [ -e hold ]; do sleep 0.05; done
     [ ! -e pip-fails ] || {{ cat pip-fails; exit 1; }}
-    ;;
-*soundness*)
-    echo "numpy 2.1.0: X.T @ X"
-    [ ! -e broken ] || kill -SEGV $$
     ;;
 *sysconfig*) echo "$PWD/.venv/{packages}" ;;
 *) echo "python $*" >>calls ;;
@@ -139,10 +132,8 @@ UNFIT = {
         r"Python 3\.11, 3\.12 or 3\.13 is needed.*found none \(set PYTHON to its path\)",
     ),
     "an old python": (lambda f: f.add_python("3.9", too_old=1), f"{NO_WHEELS} 3.9 .*"),
-    "a new python": (lambda f: f.add_python("3.14", too_old=1), f"{NO_WHEELS} 3.14 .*"),
     "no venv": (lambda f: f.add_python(no_venv=1), "has no venv module.*"),
     "nothing can be made": (lambda f: f.touch(".cache"), "no write permission in .*/a folder, .*"),
-    "line break": (lambda f: rename(f, "two\nlines"), ".*line break.*"),
     "line break at the end": (lambda f: rename(f, "ends\n"), ".*line break.*"),
 }
 
@@ -157,13 +148,9 @@ def test_what_does_not_fit_is_said_in_one_line_before_anything_is_made(what, fol
 
 
 FULL = "ERROR: Could not install: [Errno 28] No space left on device (timed out)\n"
-BROKEN = (
-    r"linear algebra is broken on this machine: numpy 2\.1\.0: X\.T @ X crashes \(signal 11\), "
-)
 FAILING = {
     "pip": ("pip-fails", "ERROR: no\n", "pdrom: the packages cannot be installed.*ERROR: no"),
     "a full disk, not the network": ("pip-fails", FULL, ".*no space left on the disk.*"),
-    "linear algebra": ("broken", "", f"pdrom: {BROKEN}see .*/.cache/setup.log"),
 }
 
 
@@ -176,52 +163,6 @@ def test_a_failed_set_up_does_not_count_and_is_made_anew(what, folder):
         assert folder.calls == []
     folder.path.joinpath(name).unlink()
     folder.works()
-
-
-@pytest.mark.parametrize(
-    ("machine", "glibc", "works"),
-    [
-        ("Linux x86_64", True, True),
-        ("Linux aarch64", True, True),
-        ("Darwin arm64", False, True),
-        ("Linux x86_64", False, False),
-        ("Linux riscv64", True, False),
-        ("Darwin x86_64", False, False),
-    ],
-)
-def test_a_platform_without_wheels_is_refused_before_anything_is_made(
-    machine, glibc, works, folder
-):
-    for program, command in {"uname": f"echo {machine}", "getconf": str(glibc).lower()}.items():
-        folder.programs.joinpath(program).unlink()
-        folder.programs.joinpath(program).write_text(f"#!/bin/sh\n{command}\n")
-        folder.programs.joinpath(program).chmod(0o755)
-    if works:
-        folder.works()
-        return
-    assert re.fullmatch(f"pdrom: {machine}.* has no wheel .*container.*", folder.refused()[-1])
-    assert not folder.has(".venv")
-
-
-@pytest.fixture
-def readable_by_all() -> Iterator[Path]:
-    """A folder outside pytest's own, which only its owner may enter."""
-    path = Path(tempfile.mkdtemp())
-    path.chmod(0o755)
-    yield path
-    shutil.rmtree(path)
-
-
-def test_a_folder_of_another_user(readable_by_all):
-    folder = Folder(readable_by_all)
-    folder.path.chmod(0o555)
-    done = subprocess.run(
-        [folder.path / "reproduce"], env={"PATH": str(folder.programs)}, capture_output=True,
-        text=True, check=False, user=65534 if os.geteuid() == 0 else None,  # root writes anywhere
-    )  # fmt: skip
-    assert done.returncode != 0
-    (line,) = done.stderr.splitlines()
-    assert line.startswith(f"pdrom: no write permission in {folder.path}")
 
 
 def test_no_network(folder):
@@ -237,7 +178,7 @@ def test_no_network(folder):
         PIP_RETRIES="0",
     )
     assert "making .venv" in announcement
-    assert "the packages cannot be downloaded: no network? See " in line
+    assert "the packages cannot be downloaded: no network, or none for this machine? See " in line
     assert Path(line.partition("See ")[2]).is_file()
 
 
@@ -250,7 +191,7 @@ def test_the_environment_is_made_once_for_each_lock_file(folder):
     assert not folder.has(".cache/pip.pid")
 
 
-@pytest.mark.parametrize("change", ["a version", "one more", "one less"])
+@pytest.mark.parametrize("change", ["a version", "one more"])
 def test_packages_that_another_program_changed_are_noticed(change, folder):
     """Those of the executor for clusters and the tests' tools may be added."""
     folder.run()
@@ -263,8 +204,6 @@ def test_packages_that_another_program_changed_are_noticed(change, folder):
     assert folder.run()[1] == []
     if change == "one more":
         (packages / "pdrom-0.1.0.dist-info").mkdir()
-    elif change == "one less":
-        installed.rmdir()
     else:
         installed.rename(packages / "numpy-2.2.0.dist-info")
     announcement, why, *_ = folder.run()[1]
@@ -338,8 +277,9 @@ def test_a_killed_set_up_leaves_no_lock(installing):
     folder.works()
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
-@pytest.mark.parametrize("whole", [True, False], ids=["all processes", "the script alone"])
+@pytest.mark.parametrize(
+    ("whole", "number"), [(True, signal.SIGINT), (True, signal.SIGHUP), (False, signal.SIGTERM)]
+)
 def test_a_set_up_that_a_signal_ends_says_so(installing, whole, number):
     """It does not wait for the packages, which are no longer installed: the streams close."""
     folder, first = installing
@@ -350,20 +290,3 @@ def test_a_set_up_that_a_signal_ends_says_so(installing, whole, number):
     said = [line for line in errors.splitlines() if "packages" not in line]
     assert said[-1] == f"pdrom: {ENDINGS[number]}; the same command goes on"
     assert folder.calls == []
-
-
-def test_an_interrupted_set_up_kills_nothing_that_an_older_one_left(folder):
-    folder.touch("hold-search")
-    with subprocess.Popen(["sleep", "600"]) as stranger:
-        folder.path.joinpath(".cache").mkdir()
-        folder.touch(".cache/pip.pid", f"{stranger.pid}\n")
-        process = folder.start()
-        while not folder.has("searching"):
-            time.sleep(0.02)
-        process.send_signal(signal.SIGTERM)
-        folder.path.joinpath("hold-search").unlink()
-        process.communicate(timeout=60)
-        alive = stranger.poll() is None
-        stranger.kill()
-    assert process.returncode == 143
-    assert alive

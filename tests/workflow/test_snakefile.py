@@ -104,8 +104,7 @@ def test_a_fresh_clone_plans_the_whole_study_beside_a_run_and_starts_no_other(cl
     assert "Paper paper/main.pdf" in log
     total = int(re.search(r"^total +(\d+)$", log, re.MULTILINE)[1])
     assert total > 100
-    told = rf"^pdrom: {total} jobs, about \d+ min on 1 core, about \d+ min of processor time$"
-    assert re.search(told, log, re.MULTILINE)
+    assert re.search(r"^pdrom: about \d+ min on 1 core$", log, re.MULTILINE)
     missing = re.findall(r"Missing output files: ([^;\n]*)", log)
     made = {path for files in missing for path in files.split(", ")}
     wanted = {f"results/tables/{name}.csv" for name in declared()}
@@ -151,7 +150,6 @@ def test_a_scene_outside_the_study_is_run_for_its_own_file(plan):
     ("arguments", "words"),
     [
         (("-n", "figure_scalign"), "did you mean 'figure_scaling'?"),
-        (("--report", "report.html"), "report: this configuration has no paper/main.pdf"),
         (("--config", 'scenes=["../x"]'), "configuration (config/default.yaml): scenes.0 = '../x'"),
     ],
 )

@@ -17,7 +17,7 @@ from typing import NamedTuple, TextIO, cast
 
 from threadpoolctl import threadpool_limits
 
-from pdrom.core.errors import INTERRUPTED, PdromError
+from pdrom.core.errors import PdromError
 from pdrom.core.store.checksum import damaged_set_aside
 
 PACKAGES = ("pdrom", "study")
@@ -54,9 +54,6 @@ def job_log(path: str) -> Iterator[logging.Logger]:
     except PdromError as error:
         logger.error("%s", error)
         sys.exit(f"pdrom: {error}")
-    except KeyboardInterrupt:
-        logger.error("interrupted")
-        sys.exit(INTERRUPTED)
     except Exception as error:
         fault = f"{type(error).__name__}: {error}"
         logger.error("%s (traceback in %s)\n%s", fault, path, traceback.format_exc())

@@ -131,11 +131,9 @@ LIVE_MODEL = Place("article/live/{scene}.js")
 ARTICLE = Place("article/{name}")
 LIVE_PAGE = Place("article/live.html")
 
-PLACES = tuple(place for place in vars().copy().values() if isinstance(place, Place))
-
 
 def labels_in(
-    path: str, results: str, places: Iterable[Place] = PLACES
+    path: str, results: str, places: Iterable[Place]
 ) -> Iterator[tuple[Place, dict[str, str]]]:
     """Yield each of ``places`` whose pattern ``path`` fits, and labels, as {"scene": "bar140"}."""
     for place in places:

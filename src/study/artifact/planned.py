@@ -3,8 +3,7 @@
 A run keeps the texts that its plan has read in a file, and its jobs import modules from there
 (docs/decisions/0001-code-fingerprints.md).
 
-``python -m study.artifact.planned MODULE ARGUMENTS`` runs a module in a new process of a job, and
-``... planned SCRIPT.py`` a job without the fork server.
+``python -m study.artifact.planned MODULE ARGUMENTS`` runs a module in a new process of a job.
 """
 
 import hashlib
@@ -68,15 +67,11 @@ class _Planned(SourceFileLoader):
 
 def import_planned() -> None:
     """Import modules as planned from now on, if a run has started this process."""
-    if KEPT in os.environ:
+    if KEPT in os.environ and _Planned not in sys.meta_path:
         sys.meta_path.insert(0, _Planned)
 
 
 if __name__ == "__main__":
     import_planned()
     del sys.argv[0]
-    if sys.argv[0].endswith(".py"):
-        sys.path[0] = os.path.dirname(sys.argv[0])
-        runpy.run_path(sys.argv[0], run_name="__main__")
-    else:
-        runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

@@ -21,7 +21,7 @@ from snakemake.script import PythonScript
 from study.artifact import planned
 
 # On macOS, forks of a process that has loaded system frameworks are unsafe.
-SUPPORTED = sys.platform == "linux"
+METHOD = "forkserver" if sys.platform == "linux" else "spawn"
 # `multiprocessing` starts and collects processes in one thread at a time.
 _ONE_AT_A_TIME = Lock()
 
@@ -31,7 +31,7 @@ def start_server(preloaded: str = "study.pipeline.preloaded") -> None:
 
     A script in a container is left to Snakemake.
     """
-    if SUPPORTED:
+    if METHOD == "forkserver":
         multiprocessing.set_forkserver_preload([preloaded])
         forkserver.ensure_running()
     own = PythonScript.execute_script
@@ -46,15 +46,12 @@ def start_server(preloaded: str = "study.pipeline.preloaded") -> None:
 
 
 def run_script(script: str) -> None:
-    """Run the file ``script`` in a fork of the server; without a server, in a new interpreter.
+    """Run the file ``script`` in a fork of the server, or in a new interpreter on macOS.
 
     Raises CalledProcessError with the exit status, or the negative number of the signal, of a
     script that fails, as `subprocess` does.
     """
-    if not SUPPORTED:
-        subprocess.run([sys.executable, "-m", planned.__name__, script], check=True)
-        return
-    job = multiprocessing.get_context("forkserver").Process(target=_run_as_main, args=[script])
+    job = cast(Any, multiprocessing.get_context(METHOD)).Process(target=_run_as_main, args=[script])
     with _ONE_AT_A_TIME:
         job.start()
     wait([job.sentinel])
@@ -68,13 +65,15 @@ def run_script(script: str) -> None:
 
 def _run_as_main(script: str) -> None:
     """Run ``script`` as a main program, in a process group that ends with the run."""
+    planned.import_planned()
     os.setpgid(0, 0)
-    run = cast(int, cast(Any, multiprocessing.parent_process()).sentinel)
-    # the system kills the group when the run closes its end of this pipe, however it ends
-    fcntl.fcntl(run, fcntl.F_SETOWN, -os.getpid())
-    fcntl.fcntl(run, fcntl.F_SETSIG, signal.SIGKILL)
-    fcntl.fcntl(run, fcntl.F_SETFL, os.O_ASYNC)
-    if wait([run], timeout=0):  # it has ended before
-        os._exit(1)
+    if sys.platform == "linux":
+        # the system kills the group when the run closes its end of this pipe, however it ends
+        run = cast(int, cast(Any, multiprocessing.parent_process()).sentinel)
+        fcntl.fcntl(run, fcntl.F_SETOWN, -os.getpid())
+        fcntl.fcntl(run, fcntl.F_SETSIG, signal.SIGKILL)
+        fcntl.fcntl(run, fcntl.F_SETFL, os.O_ASYNC)
+        if wait([run], timeout=0):  # it has ended before
+            os._exit(1)
     sys.argv, sys.path[0] = [script], os.path.dirname(script)
     runpy.run_path(script, run_name="__main__")

@@ -34,28 +34,29 @@ def rules(plan: Plan, cores: int) -> Iterator[SimpleNamespace]:
 
 
 def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespace:
+    """Rule of the jobs of ``experiment``, one for each combination of its labels."""
+
     def of(value: Callable[[Job], Any]) -> Callable[[Any], Any]:
         return lambda wildcards: value(plan.job(experiment, wildcards))
 
     def paths(name: str) -> Callable[[Any], Any]:
         return of(lambda job: job.inputs[name])
 
+    outputs, alone = experiment.writes.items(), experiment.alone
     labels = "_".join(f"{{{label}}}" for label in experiment.labels)
     title = experiment.title.replace("{", "{wildcards.")
     return SimpleNamespace(
         name=experiment.rule,
         input={name: paths(name) for name in experiment.files},
-        output={
-            name: f"{plan.results}/{place.pattern}" for name, place in experiment.writes.items()
-        },
+        output={name: f"{plan.results}/{place.pattern}" for name, place in outputs},
         log=f"{plan.results}/logs/{experiment.rule}{'/' if labels else ''}{labels}.log",
         # on a cluster, a scene's jobs form a batch; those that measure times or lack a scene do not
-        group=None if experiment.alone or "scene" not in experiment.labels else "scene",
-        threads=cores if experiment.alone else 1,
+        group=None if alone or "scene" not in experiment.labels else "scene",
+        threads=cores if alone else 1,
         # a job that measures times gets a whole node of a cluster
-        resources={"slurm_extra": "--exclusive"} if experiment.alone else {},
+        resources={"slurm_extra": "--exclusive"} if alone else {},
         params={"artifact": experiment.address, **{n: of(attrgetter(n)) for n in PARAMETERS}},
-        message=f"{title} (alone on the machine)" if experiment.alone else title,
+        message=f"{title} (alone on the machine)" if alone else title,
         shown={},
     )
 
@@ -63,7 +64,6 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
 def _fixed(plan: Plan, job: Job, folder: str) -> SimpleNamespace:
     """Snakemake rule of ``job``, the only one of its artifact, with its log in logs/``folder``."""
     artifact, outputs = job.artifact, job.outputs
-    params = {"artifact": artifact.address, **{name: getattr(job, name) for name in PARAMETERS}}
     # the inputs of the manuscript have names of documents, too
     chapters = {} if artifact.name == "paper_inputs" else SHOWN[folder]
     labels = {"name": artifact.name, "title": to_plain(artifact.title)}
@@ -75,7 +75,7 @@ def _fixed(plan: Plan, job: Job, folder: str) -> SimpleNamespace:
         group="report",
         threads=1,
         resources={},
-        params=params,
+        params={"artifact": artifact.address, **{n: getattr(job, n) for n in PARAMETERS}},
         message=f"{folder.capitalize().removesuffix('s')} {next(iter(outputs.values()))}",
         shown={n: {"category": c, "labels": labels} for n, c in chapters.items() if n in outputs},
     )

@@ -20,7 +20,7 @@ from study.pipeline import running
 from study.pipeline.commandline import CommandLine, one_line, remember
 from study.pipeline.failures import Failures
 from study.pipeline.fingerprint import memory
-from study.pipeline.fork_server import SUPPORTED, start_server
+from study.pipeline.fork_server import start_server
 from study.pipeline.manifest import write_manifest
 from study.pipeline.plan import Plan
 from study.pipeline.scenes import Coarsen
@@ -108,7 +108,7 @@ class Run:
         os.environ[planned.KEPT] = str(planned.PLAN.absolute())
         if workflow.local_exec:
             start_server()
-        if not (workflow.local_exec and SUPPORTED):  # else the server ends all jobs with this run
+        else:
             handle(signal.default_int_handler)  # Snakemake then cancels its jobs
 
     def succeed(self, plan: Plan) -> None:

@@ -1,7 +1,6 @@
 """What a job leaves in its log, its usage in the last line, and what the user sees if it fails."""
 
 import errno
-import io
 import logging
 import os
 import subprocess
@@ -13,7 +12,7 @@ import pytest
 import scipy.linalg  # noqa: F401  -- loads libraries that have threads
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from pdrom.core.errors import INTERRUPTED, MeshError
+from pdrom.core.errors import MeshError
 from pdrom.core.store.checksum import sets_aside
 from study.artifact.logs import job_log, usage_of, usage_since, warnings_to
 
@@ -84,34 +83,6 @@ def test_a_failed_job_ends_with_one_line(path, failure, said):
     else:
         assert caught.value.code.endswith(f" (traceback in {path})")
         assert "test_logs.py" in path.read_text()
-
-
-def test_an_interrupted_job_ends_without_a_traceback(path, capfd):
-    with pytest.raises(SystemExit) as caught, job_log(str(path)):
-        raise KeyboardInterrupt
-    assert caught.value.code == INTERRUPTED
-    assert path.read_text().endswith("ERROR   pdrom: interrupted\n")
-    assert capfd.readouterr().err == ""
-
-
-def test_a_log_that_cannot_be_written_is_named(tmp_path):
-    (tmp_path / "logs").write_text("a file in place of the folder")
-    with pytest.raises(SystemExit) as caught, job_log(str(tmp_path / "logs" / "job.log")):
-        pass
-    assert "job.log: cannot be written (" in caught.value.code
-
-
-def test_a_full_disk_prints_no_traceback_for_each_message(path, capfd, monkeypatch):
-    """The log is cut short; what the job itself cannot write is another matter."""
-    with (
-        job_log(str(path)) as logger,
-        open("/dev/full", "wb", buffering=0) as full,
-        monkeypatch.context() as patch,
-    ):
-        stream = io.TextIOWrapper(full, write_through=True)
-        patch.setattr(logger.handlers[-1], "stream", stream)
-        logger.info("a message")
-    assert capfd.readouterr().err == ""
 
 
 def test_warnings_of_the_planning_are_shown_once(capsys):

@@ -8,15 +8,15 @@ import sys
 import pytest
 
 from study.artifact.planned import KEPT, plan
-from study.pipeline.fork_server import SUPPORTED
+from study.pipeline.fork_server import METHOD
 
 MODULE = "pdrom.core.errors"
 FORKED = """
 from study.pipeline import fork_server
 from snakemake.script import PythonScript
 from types import SimpleNamespace
-fork_server.SUPPORTED = {}
-fork_server.start_server(["h5py"])
+fork_server.METHOD = "{}"
+fork_server.start_server("h5py")
 for _ in "ab":
     PythonScript.execute_script(SimpleNamespace(container_img=None), "job.py")
 """
@@ -29,16 +29,16 @@ for _ in "ab":
 
 @pytest.mark.parametrize(
     "owner",
-    [FORKED.format(SUPPORTED), FORKED.format(False), CHILD],
+    [FORKED.format(METHOD), FORKED.format("spawn"), CHILD],
     ids=["a fork", "without a server", "a process of a job"],
 )
 def test_a_job_imports_what_the_plan_has_read(owner, tmp_path):
     """The file in ``src`` has another text all the time; the second job finds compiled code."""
     (tmp_path / "job.py").write_text(f"import {MODULE}")
-    path, kept = plan()[0][MODULE][0], tmp_path / "plan.json"
+    path, kept = plan()[MODULE][0], tmp_path / "plan.json"
     for word in ("planned", "planned again"):
         text = f"print('{word}', __file__)"
-        kept.write_text(json.dumps([{**plan()[0], MODULE: (path, text)}, {}]))
+        kept.write_text(json.dumps({**plan(), MODULE: (path, text)}))
         done = subprocess.run(
             [sys.executable, "-c", owner], cwd=tmp_path,
             env={**os.environ, KEPT: str(kept)}, capture_output=True, text=True, check=True,

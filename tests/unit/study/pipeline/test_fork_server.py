@@ -12,9 +12,9 @@ from snakemake.script import PythonScript
 
 from study.pipeline import fork_server
 from study.pipeline import run as running
-from study.pipeline.fork_server import SUPPORTED, start_server
+from study.pipeline.fork_server import METHOD, start_server
 
-pytestmark = pytest.mark.skipif(not SUPPORTED, reason="no safe forks on this platform")
+pytestmark = pytest.mark.skipif(METHOD != "forkserver", reason="no safe forks on this platform")
 
 # A process that starts the server, lets Snakemake run the scripts of its arguments one after the
 # other, and says how they end.
@@ -148,7 +148,7 @@ def test_a_job_ends_with_its_server_and_the_next_one_has_another_server(tmp_path
 
 def test_a_script_in_a_container_is_left_to_snakemake(monkeypatch):
     ran = []
-    monkeypatch.setattr(fork_server, "SUPPORTED", False)
+    monkeypatch.setattr(fork_server, "METHOD", "spawn")
     monkeypatch.setattr(PythonScript, "execute_script", lambda *given: ran.append(given))
     start_server()
     contained = SimpleNamespace(container_img="pdrom.sif")

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from pdrom.core.errors import ConfigurationError, PdromError
+from pdrom.core.errors import ConfigurationError
 from pdrom.core.store import write_table
 from places import ROOT
 from study.artifact.logs import Usage
@@ -18,7 +18,7 @@ from study.pipeline import tracked
 from study.pipeline.run import expected_seconds
 from study.pipeline.scenes import Coarsen
 from study.pipeline.summary import minutes
-from study.pipeline.tracked import COLUMNS, COSTS, measured_costs, recorded_verdicts, updated
+from study.pipeline.tracked import COLUMNS, COSTS, costs, updated
 from study.tables import declared
 from study.tables.claims.claims import COMMITS, MEASURED, RECORDED, RULES, claims, replication
 from study.tables.claims.rules import load_claims
@@ -88,19 +88,12 @@ def test_costs_are_read_from_the_logs_of_two_runs(tmp_path):
     say(coarse, "fom/a.log", 0.5)
     say(coarse, "frame_times.log", 0.25)
     (full / "logs" / "fom" / "failed.log").write_text("ERROR pdrom: no\n", encoding="utf-8")
-    table = measured_costs(str(full), str(coarse))
+    table = costs(str(full), str(coarse))
     assert list(table.columns) == COLUMNS
     assert table.to_numpy().tolist() == [
         ["fom", 4.0, 0.5, 4.0, 250],
         ["frame_times", 7.0, 0.25, 8.0, 200],
     ]
-
-
-def test_what_git_does_not_keep_or_no_run_has_measured_is_not_written(tmp_path):
-    with pytest.raises(PdromError, match=r"'cost': unknown .*did you mean 'costs'"):
-        updated("cost")
-    with pytest.raises(PdromError, match="run the study first"):
-        measured_costs(str(tmp_path), str(tmp_path))
 
 
 @pytest.mark.parametrize("kind", TABLE.index)
@@ -126,14 +119,13 @@ def test_recorded_rows_have_no_times_and_are_outdated_if_code_changes(tmp_path, 
     for name in tracked.KEPT:
         row = {column: ["1"] for column in declared()[name].column_names}
         write_table(pd.DataFrame(row), results / f"tables/{name}.csv")
-    say(results, "alternatives/s/x1.log", 1.0, wall=95.0)
     made = updated("rows")
-    assert "ms_per_frame" not in made[Path("config/reference/recorded/alternatives.csv")]
+    assert "ms_per_frame" not in made["config/reference/recorded/alternatives.csv"]
     made[tracked.MADE].to_csv("made.csv", index=False)
-    monkeypatch.setattr(tracked, "MADE", Path("made.csv"))
+    monkeypatch.setattr(tracked, "MADE", "made.csv")
     assert tracked.outdated_rows() is None
     monkeypatch.setattr(tracked, "fingerprint", lambda *modules: "changed")
-    assert "tracked rows (last time 1 min 35 s)" in str(tracked.outdated_rows())
+    assert "study.pipeline.tracked rows" in str(tracked.outdated_rows())
 
 
 @pytest.fixture
@@ -143,7 +135,7 @@ def record(tmp_path: Path) -> Path:
     for name in (*(ROOT / "config").glob("*.yaml"), ROOT / "config/scenes"):
         (tmp_path / "config" / name.name).symlink_to(name)
     write_table(claims.checked(verdicts()), tmp_path / "claims.csv")
-    recorded = recorded_verdicts(tmp_path / "claims.csv", ROOT / RULES).assign(replication="first")
+    recorded = tracked.verdicts(tmp_path / "claims.csv").assign(replication="first")
     (folder := (tmp_path / RECORDED).parent).mkdir()
     recorded.to_csv(folder / "claims.csv", index=False)
     lines = "replication,frozen,recorded,code_frozen,code_recorded", "first,aa,,,", "second,bb,,,"
@@ -171,13 +163,13 @@ def test_a_record_is_refused_if_code_or_a_scene_changed_since_it_was_frozen(
     record, tmp_path, monkeypatch, change
 ):
     monkeypatch.chdir(tmp_path)
-    updated("frozen")[Path(COMMITS)].to_csv(COMMITS, index=False)
-    made = tracked.replicated(tmp_path / "claims.csv")
-    assert made[Path(RECORDED)].replication.tolist() == 2 * ["first"] + 2 * ["second"]
-    assert made[Path(COMMITS)].iloc[-1, -1] == made[Path(COMMITS)].iloc[-1, -2]
+    updated("frozen")[COMMITS].to_csv(COMMITS, index=False)
+    made = tracked.replication(tmp_path / "claims.csv")
+    assert made[RECORDED].replication.tolist() == 2 * ["first"] + 2 * ["second"]
+    assert made[COMMITS].iloc[-1, -1] == made[COMMITS].iloc[-1, -2]
     monkeypatch.setattr(tracked, *change)
     with pytest.raises(ConfigurationError, match=r"csv: second: frozen is '\w{16} \w{16}'"):
-        tracked.replicated(tmp_path / "claims.csv")
+        tracked.replication(tmp_path / "claims.csv")
 
 
 def test_code_rules_and_scenes_of_the_last_record_are_the_frozen_ones() -> None:

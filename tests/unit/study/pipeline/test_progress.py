@@ -6,7 +6,8 @@ import pytest
 from snakemake.settings.types import OutputSettings
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
-from study.pipeline.progress import rounded
+
+from snakemake_logger_plugin_pdrom import rounded
 
 
 @pytest.fixture
@@ -61,3 +62,9 @@ def test_failed_jobs_warnings_and_errors_outside_of_jobs_are_printed(emit):
     assert lines[1:] == [
         "Missing input files", "a warning", "Nothing to be done (all files are present).",
     ]  # fmt: skip
+
+
+def test_a_dry_run_prints_numbers_of_jobs_once_and_reasons(emit):
+    stats = {"event": LogEvent.RUN_INFO, "stats": {"total": 2}, "msg": "Job stats: 2"}
+    lines = emit(stats, JOB, stats, {"msg": "Reasons: x"}, {"msg": "a dry-run"}, dryrun=True)
+    assert lines == ["Job stats: 2", "Reasons: x"]

@@ -79,10 +79,7 @@ def rewrite(change):
 def test_an_entry_has_checksums_and_what_made_the_file_and_equal_results_have_equal_entries():
     entries = read_manifest("results").files
     assert list(entries) == ["../paper/main.pdf", "fom/a/train.h5", "paper/m.tex", "tables/a.csv"]
-    assert {name for name, e in entries.items() if e.sha256 is None} == {"fom/a/train.h5"}
     assert {(e.made_by, e.code_sha256) for e in entries.values()} == {("rule", "c0de")}
-    environment = entries["paper/m.tex"].environment
-    assert "numpy" in read_manifest("results").environments[environment]["library_versions"]
     before = Path("results/manifest.json").read_bytes()
     write_manifest(SUBJECT.plan, OPTIONS)
     assert Path("results/manifest.json").read_bytes() == before
@@ -154,7 +151,7 @@ FAULTS = (
     (lost, ("results/manifest.json",), f"NAME: no such file{RUN}"),
     (lost, ("results/paper/.m.tex.blake2b",), f"{NAMES[3]}: damaged"),
     (broken_maker, NAMES[2:3], f"NAME: not what its inputs give; {AGAIN}"),
-    (no_manifest, ("{", '{"format": 2}', '{"format": 1, "file": {}}'), RUN),
+    (no_manifest, ("{", '{"format": 1}', '{"format": 2, "file": {}}'), RUN),
 )  # fmt: skip
 
 
