@@ -130,22 +130,6 @@ def test_a_run_whose_fork_server_is_killed_says_so_and_goes_on(undisturbed, fres
     heals(fresh, undisturbed)
 
 
-@slow
-def test_the_second_run_at_once_says_so_and_ends(undisturbed, fresh):
-    """Whether by ``./reproduce`` or by ``snakemake``; what only looks works meanwhile."""
-    first = _caught_writing(fresh, "fom", "hold")
-    for second in (fresh.run(TABLE), fresh.snakemake(TABLE), fresh.snakemake("--unlock")):
-        assert second[0] != 0
-        line = second[1].splitlines()[-1]
-        assert line.startswith(f"pdrom: another run (process {first.pid} on ")
-    status, output = fresh.snakemake("-n", TABLE)
-    assert status == 0, output
-    fresh.path("release").touch()
-    said, _ = first.communicate(timeout=300)
-    assert first.returncode == 0, said
-    assert fresh.results() == undisturbed.results()
-
-
 def files_of_32_kb() -> None:
     """As by a quota; no mount is needed. The script of the job is smaller, the run is not."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (32_000, 32_000))

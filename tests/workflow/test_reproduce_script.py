@@ -235,16 +235,6 @@ def test_arguments_are_handed_on(folder):
     assert said[2:] == [[], []]
 
 
-def test_help_makes_nothing(folder):
-    process = folder.start("--help")
-    output, _ = process.communicate(timeout=60)
-    assert process.returncode == 0
-    for word in ("TARGETS", "--configfile", "-n", "--report", "test", "results/tables"):
-        assert word in output
-    assert "set -eu" not in output
-    assert not folder.has(".venv")
-
-
 @pytest.fixture
 def installing(folder: Folder) -> Iterator[tuple[Folder, subprocess.Popen[str]]]:
     """A set-up that stays at work."""
@@ -267,14 +257,6 @@ def test_the_second_of_two_set_ups_ends_at_once(installing):
     assert first.returncode == 0
     assert folder.run()[0] == 0
     assert len(folder.calls) == 2
-
-
-def test_a_killed_set_up_leaves_no_lock(installing):
-    folder, first = installing
-    os.killpg(first.pid, signal.SIGKILL)
-    first.communicate(timeout=60)
-    folder.path.joinpath("hold").unlink()
-    folder.works()
 
 
 @pytest.mark.parametrize(

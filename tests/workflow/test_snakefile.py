@@ -5,10 +5,6 @@ A start of Snakemake takes seconds, so that each plan is asked several questions
 
 import os
 import re
-import shutil
-import subprocess
-import sys
-import sysconfig
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -112,20 +108,6 @@ def test_a_fresh_clone_plans_the_whole_study_beside_a_run_and_starts_no_other(cl
     assert wanted | {"paper/main.pdf", "paper/supplement.pdf"} <= made
 
 
-def test_another_snakemake_is_told_where_the_package_is(clean, tmp_path):
-    """One that has all packages of the lock file, but not this project's."""
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path], check=True)
-    locked = Path(sysconfig.get_path("purelib"))
-    own = tmp_path / locked.relative_to(sys.prefix)
-    (own / "locked.pth").write_text(f"{locked}\n", encoding="utf-8")
-    shutil.move(clean.folder / "src", clean.folder / "moved")
-    try:
-        done = clean.looks("-n", python=tmp_path / "bin" / "python")
-    finally:
-        shutil.move(clean.folder / "moved", clean.folder / "src")
-    assert "has no package pdrom: use ./reproduce, or .venv/bin/snakemake" in only_line(done.stderr)
-
-
 def test_one_figure_needs_no_more_than_its_own_inputs(clean):
     """No table of the whole study, and of the scenes only the two that it draws."""
     figure = "results/figures/spring_runs.pdf"
@@ -158,6 +140,19 @@ def test_what_nobody_makes_is_refused(arguments, words, clean):
     assert not (clean.folder / "results").exists()
 
 
+def test_options_of_snakemake_work_as_its_manual_says(clean, tmp_path):
+    assert clean.looks("--lint").returncode == 0
+    (tmp_path / "config.yaml").write_text("cores: 1\ndry-run: true\n")
+    target = ("--", "results/fom/bar140/train.h5")
+    said = clean.looks("--profile", str(tmp_path), *target)
+    assert said.returncode == 0, said.stderr
+    assert "fom" in clean.looks("--list-rules").stdout.splitlines()
+    for option in ("--dag", "--rulegraph"):
+        done = clean.snakemake(option, *target)
+        assert done.stdout.startswith("digraph"), done.stderr
+        assert len(re.findall(r'label = "(?:fom|mesh)', done.stdout)) == 2
+
+
 TEMPLATE = "__use_yte__: templates are not allowed"
 
 
@@ -165,7 +160,6 @@ TEMPLATE = "__use_yte__: templates are not allowed"
     ("path", "own", "words"),
     [
         ("config/default.yaml", False, f"config/default.yaml: {TEMPLATE}"),
-        ("config/scenes/bar_twist.yaml", False, "config/scenes/bar_twist.yaml: unknown key '__use"),
         ("own.yaml", True, f"own.yaml: {TEMPLATE}"),
         ("none.yaml", True, "none.yaml: no such configuration file"),
     ],
@@ -273,16 +267,6 @@ class First(Selection):
         return {r: np.arange(min(r, len(v) // size)) for r in ranks}
 ''',
 )  # fmt: skip
-
-
-def test_registering_a_selection_reruns_the_methods_that_use_it(finished):
-    """One method of the study takes it."""
-    finished.register(*SELECTION)
-    old = "rows: element, selection: greedy, solve: qr}"
-    planned = replanned(finished, "config/methods.yaml", old, old.replace("greedy", "first"))
-    assert {p for p in planned if _stage(p) == "reruns"}
-    assert {Path(p).stem for p in planned if _stage(p) == "sampling"} == {"block-deim"}
-    assert not {p for p in planned if _stage(p) in ("fom", "pod", "sensitivity")}
 
 
 def _below(path: str) -> list[str]:

@@ -2,7 +2,6 @@
 
 import errno
 import logging
-import os
 import subprocess
 import sys
 import time
@@ -103,20 +102,6 @@ def test_processor_time_and_memory_are_those_of_the_process_and_of_what_it_start
     assert after.processor - before.processor >= 0.2
     assert after.wall >= before.wall
     assert after.memory >= held.nbytes / 1e6
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks on this platform")
-def test_a_fork_begins_with_no_processor_time(tmp_path):
-    sum(range(10**6))
-    process = os.fork()
-    if process == 0:
-        with job_log(str(tmp_path / "job.log")):
-            pass
-        os._exit(0)
-    os.waitpid(process, 0)
-    used = usage_of(tmp_path / "job.log")
-    assert used is not None
-    assert used.processor < usage_since(time.monotonic()).processor
 
 
 def test_a_job_that_failed_has_no_usage(tmp_path):

@@ -170,9 +170,3 @@ def test_a_record_is_refused_if_code_or_a_scene_changed_since_it_was_frozen(
     monkeypatch.setattr(tracked, *change)
     with pytest.raises(ConfigurationError, match=r"csv: second: frozen is '\w{16} \w{16}'"):
         tracked.replication(tmp_path / "claims.csv")
-
-
-def test_code_rules_and_scenes_of_the_last_record_are_the_frozen_ones() -> None:
-    *_, last = pd.read_csv(ROOT / COMMITS, dtype=str).itertuples()
-    assert last.code_recorded == last.code_frozen
-    assert re.fullmatch("[0-9a-f]{8} [0-9a-f]{8}", f"{last.frozen} {last.recorded}")

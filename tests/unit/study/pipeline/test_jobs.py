@@ -41,13 +41,6 @@ def test_every_table_finds_what_it_reads_in_the_order_of_the_study():
     assert made["claims"].inputs["rules"] == "config/claims.yaml"
 
 
-def test_the_table_of_equal_errors_knows_what_constraints_act_on():
-    scenes = {"bar80": "tetrahedra", "cloth_all": "triangles", "spring_oop": "springs"}
-    asked = plan(alternatives={"scenes": {name: [1] for name in scenes}})
-    made = {job.artifact.name: job for job in asked.fixed["tables"]}
-    assert made["equal_error"].settings["elements"] == scenes
-
-
 def test_an_own_study_plans_only_what_its_own_scenes_have():
     default = read_yaml(CONFIG_FOLDER / "default.yaml")
     own = Plan(Study(default | {"scenes": ["ball_shell", "torus_release"]}, ROOT), Folders("out"))
@@ -72,21 +65,6 @@ def test_an_own_study_plans_only_what_its_own_scenes_have():
     for changes in ({}, {"scenes": ["ball_shell"], "claim_sets": {"sound_scenes": ["ball_shell"]}}):
         whole = Plan(Study(default | changes, ROOT), Folders("out"))
         assert {*whole.tables, *whole.figures} == {*declared(), *declarations()}
-
-
-@pytest.mark.parametrize(
-    ("methods", "basis"),
-    [
-        (["block-deim", "published"], "none-affine-vectorised"),
-        (["deim", "published", "deim-joint"], "none-none-vectorised"),
-    ],
-)
-def test_of_each_experiments_bases_one_is_read(methods, basis):
-    """The one without weights and centring where a method has it, else the first."""
-    assert plan(methods=methods).job(declared()["singular_values"]).inputs["bases"] == [
-        f"out/pod/spring_oop/spring/{basis}.h5",
-        f"out/pod/strain_oop/strain/{basis}.h5",
-    ]
 
 
 def test_a_setting_is_a_parameter_of_those_who_read_it_only():

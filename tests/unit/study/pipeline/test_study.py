@@ -79,14 +79,6 @@ def test_what_no_subspace_takes_has_all_but_what_is_of_a_subspace(root):
     }  # fmt: skip
 
 
-def test_one_line_says_what_the_scene_goes_without(root, caplog):
-    check_subspaces(windy(root))
-    assert caplog.messages == ["windy: no position subspaces, since none takes the effect 'wind'"]
-    caplog.clear()
-    check_subspaces(windy(root, scenes=["spring_oop"]))
-    assert caplog.messages == []
-
-
 @pytest.mark.parametrize(
     ("key", "scenes"),
     [

@@ -54,12 +54,6 @@ def test_changes_that_are_in_no_commit_are_refused(clone, tmp_path):
     assert not (tmp_path / "one").exists()
 
 
-def test_without_git_there_is_no_archive(tmp_path, monkeypatch):
-    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
-    with pytest.raises(ConfigurationError, match="no git or no clone"):
-        write_archive(tmp_path, {}, tmp_path / "one")
-
-
 def test_without_a_finished_run_the_command_is_named(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(Subject, "of", lambda *_: Subject(("--configfile", "a.yaml"), Folders()))
