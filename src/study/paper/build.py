@@ -111,6 +111,7 @@ def shown_tables(tables: list[File]) -> tuple[dict[str, pd.DataFrame], str]:
             on_times = frame.claim.isin(tests.claim[tests.margin.notna()])
             said = {c.name for c in declared()[name].columns if c.timed and c.kind != "integer"}
             kept = frame.columns.str.startswith(("verdict", "same", "answer"))
+            data[name] = data[name].astype(dict.fromkeys(frame.select_dtypes(bool), object))
             data[name].loc[on_times, ~kept & frame.columns.isin(said)] = None
     return data, TIMES
 
