@@ -73,7 +73,7 @@ class CommandLine:
     def rewritten(self, more: Sequence[str], made: Mapping[str, Sequence[str]]) -> list[str]:
         """Arguments plus the options ``more``; the files ``made[target]`` replace each target."""
         targets = dict.fromkeys(file for target in self.targets for file in made[target])
-        options = _before_targets(self.arguments)
+        options = list(self.arguments)[: [*self.arguments, "--"].index("--")]
         # without "--", targets may stand anywhere among the options: remove each of them once
         for target in () if "--" in self.arguments else self.targets:
             options.remove(target)
@@ -100,11 +100,6 @@ def parsed(arguments: Sequence[str]) -> dict[str, Any]:
         more = ".venv/bin/snakemake --help explains the options; write -- before targets"
         raise ConfigurationError(f"{fault} ({more})")
     return found
-
-
-def _before_targets(arguments: Sequence[str]) -> list[str]:
-    """Return the arguments before the separator ``--``, or all of them without one."""
-    return list(arguments)[: [*arguments, "--"].index("--")]
 
 
 def completed(arguments: Sequence[str]) -> list[str]:

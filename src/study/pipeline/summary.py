@@ -59,8 +59,8 @@ def summary(command: CommandLine, plan: Plan) -> str:
         lines.append(f"made: {', '.join(command.targets)}")
     else:
         if "claims" in plan.tables:
-            verdicts = verdicts_in(folders.results).items()
-            said = [f"{claim} {' / '.join(pair)}" for claim, pair in verdicts]
+            claims = read_table(paths.TABLE.at(folders.results, name="claims")).itertuples()
+            said = [f"{row.claim} {row.verdict} / {row.verdict_beyond}" for row in claims]
             lines.append(f"verdicts (as published / beyond): {', '.join(said)}")
         lines.append(f"manuscript: {', '.join(folders.documents.values())}")
         lines.append(f"as pages: {paths.ARTICLE.at(folders.results, name='index.html')}")
@@ -84,13 +84,6 @@ def configuration(command: CommandLine) -> str:
     """Names of the configuration files and settings of ``command``, in one line."""
     names = command.configfiles or ("config/default.yaml",)
     return ", ".join([*names, *command.settings])
-
-
-def verdicts_in(results: str) -> dict[str, tuple[str, str]]:
-    """Claim -> verdicts on the preprint's and on improved methods."""
-    columns = ["claim", "verdict", "verdict_beyond"]
-    table = read_table(paths.TABLE.at(results, name="claims"), columns)
-    return {row.claim: (row.verdict, row.verdict_beyond) for row in table.itertuples()}
 
 
 def _section(table: Table) -> str:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from pdrom.core.store import checksum_path, read_table, write_table
 from pdrom.core.yamlfile import ConfigModel
 from study.artifact import reads
-from study.artifact.artifact import Artifact, declared_in, make, modules_in
+from study.artifact.artifact import declared_in, make, modules_in
 from study.artifact.paths import File, Place
 from study.experiments.kit.base import Experiment, experiment, experiments
 
@@ -81,10 +81,3 @@ def test_artifacts_are_found_and_loaded_by_their_address():
         assert resolve_name(made.address) is made
         assert set(made.types) | set(made.files) == set(made.reads)
     assert declared_in("pdrom.core", Experiment) == {}
-
-
-def test_a_function_may_take_all_outputs_by_name():
-    found = []
-    made = Artifact("a", "", {}, {"out": SCENE}, lambda outputs: found.append(outputs))
-    made.perform({}, {}, {"out": "any path"})
-    assert found == [{"out": "any path"}]

@@ -67,11 +67,6 @@ def flip(path: Path) -> None:
     os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
 
 
-def become_folder(path: Path) -> None:
-    path.unlink()
-    path.mkdir()
-
-
 def other(path: Path) -> Path:
     """The file of the same kind of the other scene."""
     return Path(str(path).replace(f"/{SCENE}", "/small"))
@@ -99,9 +94,7 @@ DAMAGES = {
     "lost": (Path.unlink, MISSING),
     "flipped": (flip, DAMAGED),
     "cut": (lambda path: path.write_bytes(path.read_bytes()[:-30]), DAMAGED),
-    "emptied": (lambda path: path.write_bytes(b""), DAMAGED),
     "without checksum": (lose_checksum, DAMAGED),
-    "folder": (become_folder, DAMAGED),
     "dead link": (lambda path: (path.unlink(), path.symlink_to("nowhere")), DAMAGED),
     "link": (link, FOREIGN),
     "copy": (copy_with_checksum, FOREIGN),
