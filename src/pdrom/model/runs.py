@@ -12,6 +12,8 @@ import h5py
 import numpy as np
 
 from pdrom.core.store import write_hdf5
+from pdrom.model.compiled.rows import flat
+from pdrom.model.constraints.local_kernel import table_of
 from pdrom.model.dynamics.acceleration import minimise
 from pdrom.model.dynamics.convergence import EstimatingStepper, frame_error
 from pdrom.model.dynamics.space import VertexSpace
@@ -59,6 +61,7 @@ class ConvergedStepper(Stepper):
         super().__init__(scene.space(system), scene.config.time_step, limit, scene.groups)
         self.space: VertexSpace
         self._from_last = from_last
+        self._table = table_of([local.local_kernel for local in self.local_steps])
         self.tolerance, self.converged = tolerance * scene.mesh.extent, True
         self.changes: list[float] = []
         self.evaluations: list[int] = []
@@ -68,22 +71,16 @@ class ConvergedStepper(Stepper):
     ) -> tuple[State, FrameReport]:
         """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored."""
         started = perf_counter()
+        elimination: Any
         s, elimination, base, anchors = self._begin(state, frame)
-        rhs, first = np.empty_like(s), s
+        first = s
         if self._from_last:
             fixed, targets, _ = self.space.fixed(frame, state.positions, state.anchors)
-            first = s.copy()
-            first[:], first[fixed] = state.positions, targets
-
-        def evaluate(y: np.ndarray) -> tuple[float, np.ndarray]:
-            np.copyto(rhs, base)
-            energy = sum(local.accumulate(y, rhs) for local in self.local_steps)
-            target = y.copy()
-            elimination.solve(rhs, target)
-            return energy + self.space.inertia_energy(y - s), target
-
-        matrix = self.space.system.matrix
-        end = minimise(evaluate, matrix, first, self.tolerance, self.iterations)
+            first = state.positions.copy()
+            first[fixed] = targets
+        system = self.space.system
+        own = flat(s), flat(base), system.inertia, self._table, elimination.factor
+        end = minimise(own, system.matrix, first, self.tolerance, self.iterations)
         self.converged &= end.change <= self.tolerance
         self.changes.append(end.change)
         self.evaluations.append(end.evaluations)

@@ -12,15 +12,18 @@ slowly on stiff meshes. L-BFGS started from A (Liu, Bouaziz and Kavan 2017, sect
 same limit in far fewer evaluations.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
+from pdrom.model.compiled.arithmetic import add, constant, first_three, scaled
 from pdrom.model.compiled.dots import dot
 from pdrom.model.compiled.functions import compiled, inner
-from pdrom.model.compiled.rows import flat, write
+from pdrom.model.compiled.rows import WIDTH, at, flat, load, write, zeros
+from pdrom.model.constraints.local_kernel import Table, call
+from pdrom.model.dynamics.solvers import Factor
+from pdrom.model.dynamics.sweeps import sweep
 
 # Tikhonov term, relative to the diagonal, of the least-squares problem for the weights of a
 # combination. It bounds them if residual differences are nearly parallel, as near convergence.
@@ -29,6 +32,7 @@ REGULARISATION = 1e-14
 DIFFERENCES = 0
 MEMORY = 8  # number of steps that L-BFGS stores
 SUFFICIENT = 1e-4  # Armijo's constant: least ratio of the objective's decrease to -slope x step
+EPSILON = float(np.finfo(float).eps)
 SHORTEST = 1e-4  # least fraction of a step to try; then a local/global iteration replaces the step
 
 
@@ -172,9 +176,6 @@ def _numbers(y: np.ndarray) -> np.ndarray:
     return y.reshape(-1) if y.flags.c_contiguous else flat(y)
 
 
-Evaluate = Callable[[np.ndarray], tuple[float, np.ndarray]]
-
-
 class Minimum(NamedTuple):
     """Last iterate (n, 3), m; largest change of its coordinates by one more local/global iteration,
     m; number of evaluations, each of a local and a global step."""
@@ -184,68 +185,154 @@ class Minimum(NamedTuple):
     evaluations: int
 
 
-def minimise(
-    evaluate: Evaluate, matrix: sparse.csr_array, y: np.ndarray, tolerance: float, limit: int
-) -> Minimum:
-    """Minimise the objective of a frame by L-BFGS in the metric of ``matrix``, with backtracking.
+Frame = tuple[np.ndarray, np.ndarray, np.ndarray, Table, Factor]
+"""Prediction s and (M/h^2) s, flat rows of four numbers; M/h^2 (n,); local kernels; factor of A,
+with free vertices only."""
 
-    evaluate : function of y; returns the objective, and the result G(y) of one local/global
-        iteration from y. The gradient is A (y - G(y)); G(y) equals y at fixed vertices.
-    matrix : A, (n, n) symmetric positive definite
-    y : (n, 3) start, m
+
+def minimise(
+    frame: Frame, matrix: sparse.csr_array, start: np.ndarray, tolerance: float, limit: int
+) -> Minimum:
+    """Minimise a frame's objective by L-BFGS in the metric of ``matrix``, with backtracking.
+
+    frame : see `Frame`
+    matrix : A, (n, n)
+    start : (n, 3) m
     tolerance : the minimisation ends when no entry of G(y) - y exceeds this, m
     limit : largest number of evaluations
     """
-    pairs: list[_Pair] = []
-    objective, target = evaluate(y)
-    d, evaluations = target - y, 1
-    while np.abs(d).max(initial=0.0) > tolerance and evaluations < limit:
-        direction = _direction(d, pairs)
-        slope = -float(np.vdot(matrix @ d, direction))
-        if slope >= 0.0:
-            pairs, direction = [], d
-            slope = -float(np.vdot(matrix @ d, d))
-        step, noise = 1.0, 8.0 * np.finfo(float).eps * abs(objective)
-        while True:
-            trial = y + step * direction
-            value, target = evaluate(trial)
-            evaluations += 1
-            if value <= objective + SUFFICIENT * step * slope + noise:
-                break
-            step *= 0.5
-            if step < SHORTEST:
-                trial, pairs = y + d, []
-                value, target = evaluate(trial)
-                evaluations += 1
-                break
-        after = target - trial
-        moved, change = trial - y, d - after
-        both = matrix @ np.hstack([moved, change])
-        a_moved, a_change = both[:, :3].copy(), both[:, 3:].copy()  # faster than strided views
-        curvature = float(np.vdot(moved, a_change))
-        if curvature > 0.0:
-            pairs = [*pairs, _Pair(moved, change, a_moved, a_change, curvature)][-MEMORY:]
-        y, d, objective = trial, after, value
-    return Minimum(y, float(np.abs(d).max(initial=0.0)), evaluations)
+    n, metric = len(start), (matrix.indptr, matrix.indices, matrix.data)
+    y, d, *others = np.empty((5, 3 * n))
+    y[:] = start.reshape(-1)
+    vectors = y, d, *others, *np.empty((4, MEMORY + 1, 3 * n)), np.empty((2, MEMORY + 1))
+    memory = *frame, zeros(WIDTH * n), zeros(WIDTH * n), zeros(WIDTH * n), np.empty(n)
+    objective, change = _evaluate_start(vectors, memory)
+    evaluations, pairs = 1, 0
+    while change > tolerance and evaluations < limit:
+        objective, change, more, pairs = _descend(objective, pairs, vectors, metric, memory)
+        evaluations += more
+    return Minimum(y.reshape(-1, 3), change, evaluations)
 
 
-class _Pair(NamedTuple):
-    """L-BFGS step s; change c, by this step, of A^-1 times the gradient; A s; A c; s^T A c."""
-
-    step: np.ndarray
-    change: np.ndarray
-    a_step: np.ndarray
-    a_change: np.ndarray
-    curvature: float
+@inner
+def _pad(vector, padded):
+    """Write ``vector`` (3 n,) to ``padded`` (4 n,), whose rows have a fourth number."""
+    for i in range(len(vector) // 3):
+        for axis in range(3):
+            padded[WIDTH * i + axis] = vector[3 * i + axis]
 
 
-def _direction(d: np.ndarray, pairs: list[_Pair]) -> np.ndarray:
-    """L-BFGS direction by the two-loop recursion (Nocedal 1980); ``d`` = -A^-1 times gradient."""
-    q, alphas = d.copy(), []
-    for pair in reversed(pairs):
-        alpha = np.vdot(pair.a_step, q) / pair.curvature
-        q -= alpha * pair.change
-        alphas.append(alpha)
-    for pair, alpha in zip(pairs, reversed(alphas), strict=True):
-        q += (alpha - np.vdot(pair.a_change, q) / pair.curvature) * pair.step
-    return q
+@inner
+def _evaluate(y, image, frame):
+    """Write the result G(y) of a local and a global step to ``image``; return the objective at y.
+
+    Its gradient is A (y - G(y)); G(y) equals y at fixed vertices. Sums have the order of NumPy's.
+    """
+    s, base, inertia, (addresses, records), factor, padded, rhs, added, squares = frame
+    panels, vertices, loads, work = factor
+    _pad(y, padded)
+    write(base, rhs)
+    energy = 0.0
+    for k in range(len(addresses)):
+        for i in range(len(added)):
+            added[i] = 0.0
+        energy += call(addresses[k], padded.ctypes.data, added.ctypes.data, records[k])
+        for i in range(len(rhs)):
+            rhs[i] += added[i]
+    for i in range(len(inertia)):
+        v = WIDTH * i
+        dx, dy, dz = padded[v] - s[v], padded[v + 1] - s[v + 1], padded[v + 2] - s[v + 2]
+        squares[i] = dx * dx + dz * dz + dy * dy
+    sweep(panels, vertices, loads, work, rhs, padded)
+    for i in range(len(inertia)):
+        for axis in range(3):
+            image[3 * i + axis] = padded[WIDTH * i + axis]
+    return energy + 0.5 * np.dot(inertia, squares)
+
+
+@compiled(nogil=True)
+def _evaluate_start(vectors, frame):
+    """Return the objective of the first iterate y and the largest entry of d = G(y) - y."""
+    y, d, _, _, image, _, _, _, _, _ = vectors
+    objective, change = _evaluate(y, image, frame), 0.0
+    for i in range(len(y)):
+        d[i] = image[i] - y[i]
+        change = _larger(change, d[i])
+    return objective, change
+
+
+@inner
+def _larger(change, entry):
+    """Return the larger of ``change`` and the magnitude of ``entry``; nan if either is nan."""
+    return change if abs(entry) <= change or change != change else abs(entry)
+
+
+@inner
+def _multiply(metric, vector, padded, product):
+    """Write A times ``vector`` (3 n,) to ``product``; ``padded`` is a working array."""
+    indptr, indices, data = metric
+    _pad(vector, padded)
+    for i in range(len(indptr) - 1):
+        total = constant(0.0)
+        for k in range(indptr[i], indptr[i + 1]):
+            total = add(total, scaled(data[k], load(padded, WIDTH * at(indices, k))))
+        product[3 * i], product[3 * i + 1], product[3 * i + 2] = first_three(total)
+
+
+@inner
+def _find_direction(pairs, d, direction, memory):
+    """Write the L-BFGS direction by the two-loop recursion (Nocedal 1980); ``d`` is -A^-1 times the
+    gradient, ``memory`` holds the last of ``pairs`` pairs, see `_descend`."""
+    steps, changes, a_steps, a_changes, (curvatures, alphas) = memory
+    write(d, direction)
+    oldest = max(0, pairs - MEMORY)
+    for pair in range(pairs - 1, oldest - 1, -1):
+        k = pair % len(steps)
+        alphas[k] = np.dot(a_steps[k], direction) / curvatures[k]
+        for i in range(len(d)):
+            direction[i] -= alphas[k] * changes[k, i]
+    for pair in range(oldest, pairs):
+        k = pair % len(steps)
+        length = alphas[k] - np.dot(a_changes[k], direction) / curvatures[k]
+        for i in range(len(d)):
+            direction[i] += length * steps[k, i]
+
+
+@compiled(nogil=True)
+def _descend(objective, pairs, vectors, metric, frame):
+    """Do a step of L-BFGS; return objective, largest entry of d, numbers of evaluations and pairs.
+
+    A pair is a step s; its change c of A^-1 times the gradient; A s; A c; s^T A c.
+    """
+    y, d, direction, trial, image, steps, changes, a_steps, a_changes, numbers = vectors
+    padded = frame[5]
+    _find_direction(pairs, d, direction, (steps, changes, a_steps, a_changes, numbers))
+    _multiply(metric, d, padded, image)
+    slope = -np.dot(image, direction)
+    if slope >= 0.0:
+        pairs = 0
+        write(d, direction)
+        slope = -np.dot(image, d)
+    step, noise, evaluations = 1.0, 8.0 * EPSILON * abs(objective), 0
+    value, plain = np.nan, False
+    while True:
+        for i in range(len(y)):
+            trial[i] = y[i] + step * direction[i]
+        value = _evaluate(trial, image, frame)
+        evaluations += 1
+        if plain or value <= objective + SUFFICIENT * step * slope + noise:
+            break
+        step *= 0.5
+        if step < SHORTEST:
+            pairs, step, plain = 0, 1.0, True
+            write(d, direction)
+    k, change = pairs % len(steps), 0.0
+    for i in range(len(y)):
+        after = image[i] - trial[i]
+        steps[k, i], changes[k, i] = trial[i] - y[i], d[i] - after
+        y[i], d[i] = trial[i], after
+        change = _larger(change, after)
+    _multiply(metric, steps[k], padded, a_steps[k])
+    _multiply(metric, changes[k], padded, a_changes[k])
+    numbers[0, k] = np.dot(steps[k], a_changes[k])
+    return value, change, evaluations, pairs + (numbers[0, k] > 0.0)
