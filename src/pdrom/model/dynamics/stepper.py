@@ -87,7 +87,8 @@ class Stepper:
         self.space = space
         self.time_step = time_step
         self.iterations = iterations
-        self.local_steps = [s.for_run() if hasattr(s, "for_run") else s for s in local_steps]
+        own = [s.for_run() if hasattr(s, "for_run") else s for s in local_steps]
+        self.local_steps: list[Any] = own
         self._acceleration = acceleration
         self._track = track_objective
         # `WholeFrames` or None; a subclass may set another object that has the same method `run`
