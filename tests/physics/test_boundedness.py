@@ -152,18 +152,6 @@ def test_the_bound_holds_in_random_scenes_and_is_nearly_met():
     assert 0.9 < max(used) <= 1.0 + 1e-6
 
 
-def test_forces_keep_what_their_accelerations_leave_of_a_velocity(rng):
-    """Reference: the difference of two predictions with velocities that differ."""
-    forces = [GRAVITY, {"effect": "damping", "rate": 3.0}]
-    scene = make_scene(
-        *forces, {"effect": "drag", "coefficient": 50.0}, {"effect": "strain", "weight": 1.0}
-    )
-    h, space, q = scene.config.time_step, scene.space(scene.system), scene.mesh.points
-    first, second = rng.standard_normal((2, *q.shape))
-    here = first - second + h * (space.acceleration(q, first) - space.acceleration(-q, second))
-    assert here == pytest.approx(kept_velocity(scene)[:, None] * (first - second), abs=1e-12)
-
-
 @pytest.mark.parametrize("tangent", [0.1, 0.3, 3.0])
 def test_growth_for_ever_is_that_of_a_resonance(tangent):
     """A mode driven with the signs of its own answer; reference: the recursion of a frame."""

@@ -102,16 +102,3 @@ def test_momentum_is_kept_and_energy_does_not_grow_without_forcing(group_scene, 
         energies.append(kinetic + potential)
     start = 0.5 * float(masses @ (velocities**2).sum(axis=1))
     assert max(energies) <= start * (1 + 1e-9)
-
-
-def test_one_factorisation_per_pin_set():
-    scene = make_scene(
-        {"effect": "pins", "select": "top", "until": 4},
-        {"effect": "pins", "select": "bottom", "start": 6, "until": 8},
-        {"effect": "pins", "select": "top", "start": 8},
-        {"effect": "spring", "weight": 1e5},
-        frames=12,
-    )
-    system = scene.system_with("supernodal")
-    trajectory(scene, system=system)
-    assert system.factorisations == 3

@@ -155,8 +155,6 @@ def error_of_mesh(
 ) -> float | None:
     """Estimate the relative error of the mesh of ``run``; None if unknown, see `mesh_error`.
 
-    Parameters
-    ----------
     run : (F + 1, N, 3) m, converged, on the scene's mesh; None if it does not converge
     coarser, runs : coarser meshes, and converged runs on them at the scene's vertices, of which the
         first and the last are used

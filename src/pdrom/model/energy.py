@@ -13,8 +13,6 @@ STRIDE = 4
 def energies(scene: Scene, positions: np.ndarray) -> np.ndarray:
     """Return total energies (n,), J, of a run: kinetic, of the constraints, and of the forces.
 
-    Parameters
-    ----------
     positions : (F + 1, N, 3) m of a run of ``scene``, initial positions first. The velocities are
         (q_f - q_{f-1}) / h as in the step loop; the initial velocities come from the scene.
 

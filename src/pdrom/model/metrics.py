@@ -15,8 +15,6 @@ def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[f
     An error is None if || p ||_F is at round-off level (a relative error is then meaningless) or if
     p_hat is not finite.
 
-    Parameters
-    ----------
     p, p_hat : (n, rows, 3) projections and their approximations
     roundoff : estimated Frobenius norm of the rounding errors in p
     """
@@ -71,8 +69,6 @@ def shape_differences(
     D_f(a, b)^2 is the least sum over the vertices of m_i / m |R a_i + t - b_i|^2, R a rotation, t a
     translation, m the mean mass: of equal masses, the norm of all differences.
 
-    Parameters
-    ----------
     positions : (F, N, 3) m, a; or (N, 3) m, the same shape in all frames
     reference : (F, N, 3) m, b
     masses : (N,) kg
@@ -110,8 +106,6 @@ def deformation_error(
     and None if the body is rigid to `RIGID` of its size or the reference has no frame. It does not
     see errors of the rigid motion: state the error of the positions as well.
 
-    Parameters
-    ----------
     positions, reference : (F, N, 3) m, without the initial state
     rest : (N, 3) m, the rest shape
     masses : (N,) kg
@@ -147,8 +141,6 @@ def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float 
 
     Q are positions of the reduced or full-order run; None if the full order stays at Q_0 or F = 0.
 
-    Parameters
-    ----------
     difference, displacement : (F,) m, Frobenius norms of Q_red - Q_fom, Q_fom - Q_0 in each frame
     """
     moved = float(np.linalg.norm(displacement))

@@ -48,7 +48,7 @@ def followed(loop: Stepper, state: State, frames: int) -> np.ndarray:
 class ConvergedStepper(Stepper):
     """Full-order step loop that minimises the objective of every frame up to a tolerance.
 
-    ``changes`` and ``evaluations`` list these fields of `Minimum` for the frames computed so far;
+    ``changes`` and ``evaluations`` list what `minimise` returns for the frames computed so far;
     ``converged`` says whether each reached the ``tolerance``, m, that held in it.
     A minimisation starts from the positions that inertia predicts or, if ``from_last``, from those
     at the beginning of the frame; it may find another minimum then.
@@ -80,11 +80,12 @@ class ConvergedStepper(Stepper):
             first[fixed] = targets
         system = self.space.system
         own = flat(s), flat(base), system.inertia, self._table, elimination.factor
-        end = minimise(own, system.matrix, first, self.tolerance, self.iterations)
-        self.converged &= end.change <= self.tolerance
-        self.changes.append(end.change)
-        self.evaluations.append(end.evaluations)
-        after, seconds = self._finish(state, end.y, frame, anchors), np.zeros(len(PHASES))
+        found = minimise(own, system.matrix, first, self.tolerance, self.iterations)
+        y, change, evaluations = found
+        self.converged &= change <= self.tolerance
+        self.changes.append(change)
+        self.evaluations.append(evaluations)
+        after, seconds = self._finish(state, y, frame, anchors), np.zeros(len(PHASES))
         seconds[1] = perf_counter() - started  # its phases are not told apart
         return after, FrameReport(np.empty(0), seconds)
 
@@ -146,8 +147,6 @@ def run(
 ) -> None:
     """Run a scene; write positions, velocities, objective, timings and the requested snapshots.
 
-    Parameters
-    ----------
     snapshot_frames : name of a constraint group -> frames (ascending) in which its projections p in
         the last local step are stored
     with_mesh : whether the mesh is written, too, so that the file can be used without the scene

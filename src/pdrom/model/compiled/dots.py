@@ -33,8 +33,6 @@ def _products(matrix, i, j, k, vector, p, sums):
 def dots(matrix, i, j, k, count, vector, starts):
     """Return ``starts`` (three numbers) plus the inner products of three rows with ``vector``.
 
-    Parameters
-    ----------
     matrix : flat array; three rows of ``count`` numbers begin at the indices i, j and k
     """
     x, y, z = starts

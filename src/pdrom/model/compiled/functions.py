@@ -117,8 +117,6 @@ def inner(function=None, **options):
 class Callback:
     """Function that compiled code calls by its `address`; first access to `address` compiles it.
 
-    Attributes
-    ----------
     function, signature : Python function to compile and its Numba signature
     """
 

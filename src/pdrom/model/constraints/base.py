@@ -49,8 +49,6 @@ class GroupConfig(EffectConfig):
 class ConstraintGroup(Effect):
     """A set of constraints of one kind, one per mesh element, which are evaluated together.
 
-    Attributes
-    ----------
     name : name of the group in configuration and tables
     elements : number e of elements
     rows_per_element : number p of rows of each element's operator
@@ -192,8 +190,6 @@ class ConstraintGroup(Effect):
 class StencilGroup(ConstraintGroup):
     """A group whose elements all have the same number m of vertices.
 
-    Attributes
-    ----------
     stencil : (e, m) int32 vertex indices
     operator : (e, p, m) dense element operators: S_e q = operator[e] @ q[stencil[e]]
     """

@@ -252,8 +252,6 @@ def fan_normals(q, vertices, elements, start, fan, triangles, normals):
 
     The normal is zero if the triangles around the vertex have no area.
 
-    Parameters
-    ----------
     q : (N, 3) positions
     vertices : (m,) vertex of each element
     elements : indices of the elements whose row of ``normals`` (m, 3) is written

@@ -138,8 +138,6 @@ def _finish(work, solid):
 def nearest_block(work, low, high, solid):
     """Replace the values of a block by the nearest ones with a product in [low, high], low > 0.
 
-    Parameters
-    ----------
     work : `SIZE` numbers per lane; at `VALUES` s_1 >= s_2 >= |s_3|, or for areas s_1, 1, s_3 with
         s_1 >= s_3 >= 0, where the 1 is not changed; values that are not finite give nan
     solid : whether there are three values (volume) instead of two (area)

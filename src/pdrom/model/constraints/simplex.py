@@ -238,8 +238,6 @@ def visiting_order(stencil: np.ndarray, vertices: int) -> np.ndarray | None:
     Elements are sorted by their vertices, which the reverse Cuthill-McKee algorithm (Cuthill and
     McKee 1969) numbers such that neighbours have similar numbers.
 
-    Parameters
-    ----------
     stencil : (e, m) vertices of each element
     vertices : number of all vertices
     """

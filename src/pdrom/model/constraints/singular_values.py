@@ -28,8 +28,6 @@ from pdrom.model.mesh.types import Mesh
 def project(y_place, p_place, record, rows, gradients, nearest):
     """Write projections of the elements that ``record`` lists; each S_e has ``rows`` rows.
 
-    Parameters
-    ----------
     y_place, p_place, record : addresses of positions, projections and record of a local kernel
     gradients, nearest : functions of a block, which compute S q and the projections
     """
@@ -54,8 +52,6 @@ def project(y_place, p_place, record, rows, gradients, nearest):
 def accumulate(y_place, rhs_place, record, rows, gradients, nearest, forces):
     """Add S^T W p of all elements to the right-hand side; return their energy in J.
 
-    Parameters
-    ----------
     y_place, rhs_place, record : arguments of a kernel, see `local_kernel`
     rows : number of rows of S_e
     gradients, nearest, forces : functions of a block of elements; they compute S q, p, the forces
@@ -82,8 +78,6 @@ def accumulate(y_place, rhs_place, record, rows, gradients, nearest, forces):
 def project_gradients(d_place, range_place, p_place, m, rows, work_size, nearest):
     """Write projections of m elements; the working array has ``work_size`` numbers an element.
 
-    Parameters
-    ----------
     d_place, p_place : addresses of deformation gradients S q, and of projections: (rows m, 3)
     range_place : address of the least and the largest allowed singular value, or product of them
     nearest : function that computes the projections of a block of elements in the working array

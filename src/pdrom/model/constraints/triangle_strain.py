@@ -142,8 +142,6 @@ def _project_gradients(d, allowed, p, m):
 def rest_frames(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return inverse rest edge matrices D^-1 (T, 2, 2), in 2-D frames, and rest areas (T,) m^2.
 
-    Parameters
-    ----------
     points : (N, 3) m, rest shape
     triangles : (T, 3) vertex indices
     """

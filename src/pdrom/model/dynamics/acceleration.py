@@ -12,8 +12,6 @@ slowly on stiff meshes. L-BFGS started from A (Liu, Bouaziz and Kavan 2017, sect
 same limit in far fewer evaluations.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy import sparse
 
@@ -176,42 +174,30 @@ def _numbers(y: np.ndarray) -> np.ndarray:
     return y.reshape(-1) if y.flags.c_contiguous else flat(y)
 
 
-class Minimum(NamedTuple):
-    """Last iterate (n, 3), m; largest change of its coordinates by one more local/global iteration,
-    m; number of evaluations, each of a local and a global step."""
-
-    y: np.ndarray
-    change: float
-    evaluations: int
-
-
 Frame = tuple[np.ndarray, np.ndarray, np.ndarray, Table, Factor]
-"""Prediction s and (M/h^2) s, flat rows of four numbers; M/h^2 (n,); local kernels; factor of A,
-with free vertices only."""
+"""Prediction s and (M/h^2) s, flat rows of four numbers; M/h^2 (n,); local kernels; factor of A."""
 
 
 def minimise(
     frame: Frame, matrix: sparse.csr_array, start: np.ndarray, tolerance: float, limit: int
-) -> Minimum:
-    """Minimise a frame's objective by L-BFGS in the metric of ``matrix``, with backtracking.
+) -> tuple[np.ndarray, float, int]:
+    """Minimise the objective of a ``frame`` by L-BFGS in the metric A = ``matrix`` (n, n).
 
-    frame : see `Frame`
-    matrix : A, (n, n)
-    start : (n, 3) m
-    tolerance : the minimisation ends when no entry of G(y) - y exceeds this, m
-    limit : largest number of evaluations
+    The search begins at ``start`` (n, 3) m. It ends when one more local/global iteration would
+    change no coordinate by more than ``tolerance``, m, or after ``limit`` evaluations. Return the
+    last iterate (n, 3) m, that largest change, m, and the number of evaluations.
     """
     n, metric = len(start), (matrix.indptr, matrix.indices, matrix.data)
     y, d, *others = np.empty((5, 3 * n))
     y[:] = start.reshape(-1)
     vectors = y, d, *others, *np.empty((4, MEMORY + 1, 3 * n)), np.empty((2, MEMORY + 1))
     memory = *frame, zeros(WIDTH * n), zeros(WIDTH * n), zeros(WIDTH * n), np.empty(n)
-    objective, change = _evaluate_start(vectors, memory)
-    evaluations, pairs = 1, 0
-    while change > tolerance and evaluations < limit:
-        objective, change, more, pairs = _descend(objective, pairs, vectors, metric, memory)
+    objective, evaluations, pairs = _evaluate(y, d, memory), 1, 0
+    d -= y
+    while (change := float(np.abs(d).max(initial=0.0))) > tolerance and evaluations < limit:
+        objective, more, pairs = _descend(objective, pairs, vectors, metric, memory)
         evaluations += more
-    return Minimum(y.reshape(-1, 3), change, evaluations)
+    return y.reshape(-1, 3), change, evaluations
 
 
 @inner
@@ -222,7 +208,7 @@ def _pad(vector, padded):
             padded[WIDTH * i + axis] = vector[3 * i + axis]
 
 
-@inner
+@compiled(nogil=True)
 def _evaluate(y, image, frame):
     """Write the result G(y) of a local and a global step to ``image``; return the objective at y.
 
@@ -248,23 +234,6 @@ def _evaluate(y, image, frame):
         for axis in range(3):
             image[3 * i + axis] = padded[WIDTH * i + axis]
     return energy + 0.5 * np.dot(inertia, squares)
-
-
-@compiled(nogil=True)
-def _evaluate_start(vectors, frame):
-    """Return the objective of the first iterate y and the largest entry of d = G(y) - y."""
-    y, d, _, _, image, _, _, _, _, _ = vectors
-    objective, change = _evaluate(y, image, frame), 0.0
-    for i in range(len(y)):
-        d[i] = image[i] - y[i]
-        change = _larger(change, d[i])
-    return objective, change
-
-
-@inner
-def _larger(change, entry):
-    """Return the larger of ``change`` and the magnitude of ``entry``; nan if either is nan."""
-    return change if abs(entry) <= change or change != change else abs(entry)
 
 
 @inner
@@ -300,7 +269,7 @@ def _find_direction(pairs, d, direction, memory):
 
 @compiled(nogil=True)
 def _descend(objective, pairs, vectors, metric, frame):
-    """Do a step of L-BFGS; return objective, largest entry of d, numbers of evaluations and pairs.
+    """Do a step of L-BFGS with backtracking; return objective, numbers of evaluations and pairs.
 
     A pair is a step s; its change c of A^-1 times the gradient; A s; A c; s^T A c.
     """
@@ -326,13 +295,12 @@ def _descend(objective, pairs, vectors, metric, frame):
         if step < SHORTEST:
             pairs, step, plain = 0, 1.0, True
             write(d, direction)
-    k, change = pairs % len(steps), 0.0
+    k = pairs % len(steps)
     for i in range(len(y)):
         after = image[i] - trial[i]
         steps[k, i], changes[k, i] = trial[i] - y[i], d[i] - after
         y[i], d[i] = trial[i], after
-        change = _larger(change, after)
     _multiply(metric, steps[k], padded, a_steps[k])
     _multiply(metric, changes[k], padded, a_changes[k])
     numbers[0, k] = np.dot(steps[k], a_changes[k])
-    return value, change, evaluations, pairs + (numbers[0, k] > 0.0)
+    return value, evaluations, pairs + (numbers[0, k] > 0.0)

@@ -112,8 +112,6 @@ class CompiledIterations:
     ) -> None:
         """Compute iterations ``which`` of the K = ``iterations`` of a frame; change ``y`` in place.
 
-        Parameters
-        ----------
         objective : (K,) receives the objective at the iterates, J; empty if it is not tracked
         y, base : iterate and (M/h^2) s, (N, 3) views of arrays (N, 4) with a column of zeros
         s : (N, 3) prediction
@@ -138,8 +136,6 @@ def all_iterations(
 ):
     """Compute iterations of a frame in place, see `CompiledIterations.run`.
 
-    Parameters
-    ----------
     which : (first, end, K): compute iterations first, ..., end - 1 of the K iterations of a frame
     y, s, base, rhs : iterate, prediction, (M/h^2) s, working array; flat rows of four numbers
     inertia : (N,) M/h^2, kg/s^2
@@ -189,8 +185,6 @@ the anchors of the states (`pdrom.model.dynamics.stepper.State`)."""
 class WholeFrames:
     """Several whole frames per compiled call, for a `pdrom.model.dynamics.space.VertexSpace`.
 
-    Parameters
-    ----------
     space : space whose ``held_path`` and ``elimination`` are used
     loop : compiled iterations that are run in each frame
     forces, contacts : of the scene; no ``rate`` of a force is None, and each contact is a floor
@@ -245,8 +239,6 @@ class WholeFrames:
         """Run the first n ``frames``, as many as one call can, and return the results; return None,
         without a run, if the solver is not compiled.
 
-        Parameters
-        ----------
         q, v : (N, 3) positions, m, and velocities, m/s, at the beginning of the first frame
         h : time step, s
         iterations : number of iterations per frame

@@ -148,8 +148,6 @@ NO_COUPLING = (np.zeros(0, np.int64), np.zeros(1, np.int32), np.zeros(0, np.int3
 class SuperLUSolver:
     """A symmetric positive definite matrix, factored and solved by SuperLU of SciPy.
 
-    Parameters
-    ----------
     matrix : (n, n)
     vertices : (n,) vertex index of each unknown: its row in arrays (N, 3)
     coupling : (n, m) matrix entries between the unknowns and m held vertices; None if m = 0

@@ -200,8 +200,6 @@ _call = caller(types.void)
 def sweep(panels, vertices, loads, x, rhs, y):
     """Overwrite the rows ``vertices`` of ``y`` by A^-1 (rhs - loads).
 
-    Parameters
-    ----------
     panels : the factored matrix A, from `pdrom.model.dynamics.solvers.panels`
     vertices : (n,) row of ``rhs`` and ``y`` of each unknown, in the order of the factor
     loads : (4 n,) rows that are subtracted from the right-hand side, in the order of the factor

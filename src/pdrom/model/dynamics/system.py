@@ -21,8 +21,6 @@ ACCURACY = 1e-6
 class Elimination:
     """Factored system without the vertices ``fixed``; x, y and z share one factorisation.
 
-    Attributes
-    ----------
     factor : (panels, vertices, loads, x) for `sweeps.sweep`; None if the solver is not compiled
     coupling : (beside, indptr, indices, data) for `sweeps.load`
     """

@@ -193,8 +193,6 @@ class Contact(Effect):
 
         A contact that moves several vertices together (self-collision) overrides this method.
 
-        Parameters
-        ----------
         positions, before : (N, 3) m at the end and at the beginning of the frame
         """
         targets = positions[held]

@@ -223,8 +223,6 @@ def square(point: np.ndarray, normal: np.ndarray, low: np.ndarray, high: np.ndar
 
     Its centre is the centre of the box projected onto the plane, its side the box diagonal.
 
-    Parameters
-    ----------
     point : (3,) m, any point of the plane
     normal : (3,), of any length
     """

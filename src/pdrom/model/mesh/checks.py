@@ -64,8 +64,6 @@ def mesh_of(points: np.ndarray, cells: np.ndarray, name: str) -> Mesh:
 def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> None:
     """Raise MeshError for an index out of range, DegenerateElementError if repeated in a cell.
 
-    Parameters
-    ----------
     cells : (E, corners) vertex indices; 0 to ``vertices`` - 1 are allowed
     kind, name : kind of the cells and name of the mesh, for messages
     """
@@ -88,8 +86,6 @@ def check_range(points: np.ndarray, scale: float, name: str) -> None:
 
     Squares of such lengths would overflow or lose all digits.
 
-    Parameters
-    ----------
     points : (N, 3), in metres after the multiplication by ``scale``
     name : name of the mesh, for messages
     """

@@ -23,8 +23,6 @@ def cloth(
     lr = ll + columns and ur = lr + 1 is split into [ll, ur, ul] and [ll, lr, ur]. The sheet is
     centred, its longer side measures ``extent`` metres, and it is lifted by ``lift`` m along y.
 
-    Parameters
-    ----------
     plane : "xy" (upright) or "xz" (horizontal)
     wave : amplitude in metres of the displacement ``wave * sin(6 u) cos(5 v)`` normal to the plane,
         where u and v are the coordinates in the sheet divided by ``extent``
@@ -59,8 +57,6 @@ def bar(nx: int, ny: int, nz: int, extent: float = 1.0, lift: float = 2.0) -> Me
     Vertex (i, j, k) has index ``(i * ny + j) * nz + k``. Neighbouring cells are mirror images, so
     that face diagonals match. The bar is centred, its longest side is ``extent`` metres.
 
-    Parameters
-    ----------
     lift : translation along y, m
     """
     counts = np.array([nx, ny, nz])

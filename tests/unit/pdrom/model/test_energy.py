@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import GRAVITY, TOP, make_scene, with_effects
-from pdrom.model.energy import STRIDE, EnergyScale, energies, largest
+from pdrom.model.energy import EnergyScale, energies, largest
 from pdrom.model.metrics import relative_errors, trajectory_error
 from pdrom.model.runs import trajectory
 from strategies import SEEDS
@@ -43,14 +43,6 @@ def test_a_state_at_rest_has_the_energy_of_its_springs():
     np.testing.assert_allclose(energies(scene, positions), expected, rtol=1e-12)
 
 
-def test_the_last_frame_counts_whatever_the_stride():
-    scene = make_scene(SPRING, frames=STRIDE + 1)
-    positions = np.stack([scene.mesh.points] * (STRIDE + 2))
-    positions[-1] *= 2.0
-    assert len(energies(scene, positions)) == 3
-    assert energies(scene, positions)[-1] > 1e3
-
-
 def test_a_run_that_gains_energy_has_a_ratio_above_one_infinite_on_overflow():
     scene = make_scene(SPRING, GRAVITY, TOP, frames=12)
     run, rest = trajectory(scene), scene.mesh.points
@@ -62,17 +54,6 @@ def test_a_run_that_gains_energy_has_a_ratio_above_one_infinite_on_overflow():
     # a scene at rest has nothing to compare with
     still = make_scene(SPRING, frames=12)
     assert largest(EnergyScale.of(still, np.stack([rest] * 13)).relative(run)) is None
-
-
-def test_the_zero_of_the_potential_does_not_matter():
-    """The same fall two metres higher: the same ratios."""
-    ratios = []
-    for lift in ({}, {"lift": 7.0}):
-        mesh = {"kind": "cloth", "rows": 6, "columns": 5, **lift}
-        scene = make_scene(SPRING, GRAVITY, frames=8, mesh=mesh)
-        run = trajectory(scene)
-        ratios.append(EnergyScale.of(scene, run).relative(run[:1].repeat(3, axis=0) + 0.01).max())
-    assert ratios[0] == pytest.approx(ratios[1], rel=1e-9)
 
 
 @given(SEEDS, st.floats(1e-6, 1e6))
@@ -99,18 +80,6 @@ def test_relative_errors_agree_with_norms_of_matrices_and_have_no_unit(seed, uni
 def test_round_off_has_no_error(rng, size, level, expected):
     p = rng.standard_normal((6, 8, 3)) * size
     assert relative_errors(p, 0.9 * p, level) == pytest.approx(expected)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
-def test_a_reconstruction_that_does_not_exist_has_no_error(rng, bad):
-    """An axis that failed leaves the others their errors; the whole has none."""
-    p = rng.standard_normal((6, 8, 3))
-    p_hat = 0.9 * p
-    p_hat[..., 1] = bad
-    total, x, y, z = relative_errors(p, p_hat, 0.0)
-    assert total is None
-    assert y is None
-    assert (x, z) == pytest.approx((0.1, 0.1))
 
 
 def test_trajectory_error_weighs_frames_by_their_motion():

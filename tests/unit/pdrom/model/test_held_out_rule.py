@@ -71,12 +71,6 @@ def test_gravity_keeps_its_size_and_turns_towards_an_axis(own, degrees, place):
         assert turned[2] == 0.0
 
 
-@pytest.mark.parametrize(("own", "axes"), [((0.0, 0.0, 0.0), [0, 1]), ((0.0, -9.81, 0.0), [1])])
-def test_gravity_that_cannot_be_turned_stays(own, axes):
-    config = Gravity.Config(acceleration=own)
-    assert config.tilted(30.0, axes, 0) == config
-
-
 def test_pins_that_share_vertices_are_carried_together_but_not_apart():
     scene = read_scene(ROOT, "cloth_all_oop")
     mesh, left = scene.mesh.build(ROOT), scene.effects[2]

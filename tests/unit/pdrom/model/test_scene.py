@@ -12,7 +12,6 @@ from pdrom.core.store import open_hdf5
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs import run, trajectory
 from places import ROOT
-from study.experiments.kit.base import varied
 from study.pipeline.scenes import Coarsen, read_scene
 
 SPRING = {"effect": "spring", "weight": 1e5}
@@ -63,14 +62,6 @@ def test_explicit_drag_beyond_its_stability_limit_is_refused():
         make_scene(SPRING, {"effect": "damping", "rate": 125.0})
 
 
-def test_a_changed_scene_has_the_mesh_and_masses_of_the_first():
-    scene = make_scene(SPRING, frames=8)
-    heavy = scene.build(scene.config, scene.mesh, masses=2.0 * scene.masses).changed(frames=3)
-    assert (heavy.config.frames, scene.config.frames) == (3, 8)
-    assert np.array_equal(heavy.masses, 2.0 * scene.masses)
-    assert heavy.mesh is scene.mesh
-
-
 def test_later_entries_change_what_they_select():
     entries = [{"select": "top", "vertex_mass": 5.0}, {"select": [0], "vertex_mass": 7.0}]
     scene = make_scene(SPRING, vertex_mass=3.0, masses=entries)
@@ -95,18 +86,6 @@ def test_a_density_weighs_the_rest_shape(effect, mesh):
     assert scene.masses.max() > 1.5 * scene.masses.min()
 
 
-def test_a_heavy_side_moves_less_and_the_centre_of_mass_stays():
-    heavy = [{"select": "left", "vertex_mass": 1e5}]
-    scene = make_scene(SPRING, masses=heavy, frames=10)
-    start = 0.05 * (scene.mesh.points - scene.mesh.points.mean(axis=0))
-    positions = trajectory(scene, perturbation=start)
-    moved = np.linalg.norm(positions[-1] - positions[0], axis=1)
-    left = scene.masses > 100.0
-    assert moved[left].max() < 0.01 * moved[~left].max()
-    centre = np.einsum("n,fna->fa", scene.masses, positions) / scene.masses.sum()
-    assert np.abs(centre - centre[0]).max() < 1e-12
-
-
 BOX = {"kind": "plane", "point": [0.1, 0, 0], "normal": [-1, 0, 0]}
 
 
@@ -129,11 +108,3 @@ def test_elements_inside_are_multiplied_and_others_left_alone(group):
     start = 0.1 * np.random.default_rng(5).standard_normal(every.mesh.points.shape)
     runs = [trajectory(s, perturbation=start) for s in (every, scene_with(group, weight=4e4))]
     assert np.array_equal(*runs)
-
-
-def test_another_stiffness_keeps_the_factors():
-    config = scene_with("spring", {"select": BOX, "factor": 7.0}).config
-    config = config.model_copy(update={"reduce": {"spring": None}})
-    stiffer = varied(config, config.time_step, 10.0, 0.1, (1, 100))
-    (effect,) = stiffer.effects
-    assert (effect.weight, effect.factors) == (1e5, config.effects[0].factors)

@@ -1,7 +1,5 @@
 """Whole frames in compiled code: bit for bit those of the loop through Python."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
@@ -78,17 +76,3 @@ def test_scenes_of_the_catalogue_are_the_same(name):
     config = read_scene(ROOT, name, Coarsen(resolution=0.15, frames=0.3))
     scene, other = (Scene.build(config, config.mesh.build(ROOT)) for _ in range(2))
     assert_same(scene, other.stepper())
-
-
-def test_a_run_begins_anew_in_the_middle():
-    """States that a run hands out are not overwritten, and any of them starts another run."""
-    scene = own("floor")
-    loop = scene.stepper()
-    states = [state for state, _ in loop.run(scene.initial_state(), range(20))]
-    kept = [state.positions.copy() for state in states]
-    again = [state for state, _ in loop.run(states[3], range(4, 20))]
-    for a, b in zip(states[4:], again, strict=True):
-        np.testing.assert_array_equal(a.positions, b.positions)
-    for state, copy in zip(states, kept, strict=True):
-        np.testing.assert_array_equal(state.positions, copy)
-    assert all(not np.array_equal(a, b) for a, b in pairwise(kept[:5]))

@@ -54,16 +54,6 @@ def test_wind_accelerates_a_flat_sheet_as_the_differential_equation_does():
     assert np.array_equal(kicked(scene, scene.mesh.points, rest), rest)
 
 
-def test_drag_has_no_say_inside_a_volume():
-    bar = {"kind": "bar", "nx": 4, "ny": 4, "nz": 4}
-    spring = {"effect": "tetrahedron_strain", "weight": 1.0}
-    scene = make_scene(spring, {"effect": "drag", "coefficient": 1e6}, mesh=bar)
-    v = np.ones_like(scene.mesh.points)
-    inside = np.setdiff1d(np.arange(scene.mesh.vertices), scene.mesh.triangles)
-    assert len(inside) == 8
-    assert np.array_equal(np.flatnonzero((kicked(scene, scene.mesh.points, v) == v).all(1)), inside)
-
-
 @given(seed=SEEDS, speed=st.floats(0.0, 6.0), mass=st.floats(-6.0, 3.0), effect=st.booleans())
 def test_energy_relative_to_the_air_never_grows(seed, speed, mass, effect):
     """For any wind up to 1e6 m/s, any state, light and heavy vertices."""
@@ -124,14 +114,3 @@ def test_smooth_has_no_kink_and_no_overshoot():
     assert (np.diff(path) >= 0.0).all()
     assert path.max() <= 1.0
     assert np.abs(np.diff(path, 2)).max() < 0.04  # linear: 0.1
-
-
-def test_another_speed_and_direction():
-    (effect,) = (e for e in handle(start=4, until=18).config.effects if e.effect == "keyframes")
-    slow = effect.with_frames_scaled(2.5)
-    assert ([key.at for key in slow.keys], slow.start, slow.until) == ([10, 25, 30], 10, 45)
-    assert [key.at for key in effect.with_frames_scaled(0.1).keys] == [1, 2, 3]
-    back = effect.redirected([0, 1])
-    assert back.keys[1].offset == (-0.1, 0.0, -0.3)
-    assert back.keys[1].turn == (0.0, -90.0, 0.0)
-    assert back.redirected([0, 1]) == effect

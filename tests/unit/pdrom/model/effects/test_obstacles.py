@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from builders import OBSTACLES, depths, make_scene
 from pdrom.model.effects.base import effect_config
-from pdrom.model.runs import trajectory
 from strategies import SEEDS
 
 SPRING = {"effect": "spring", "weight": 1.0}
@@ -121,17 +120,6 @@ def test_friction_on_a_slope_is_coulombs(mu):
         assert np.abs(q).max() < 1e-15
 
 
-def test_a_plane_is_a_floor():
-    """Same run up to rounding, with any friction that never gets a chance to act sideways."""
-    effects = [{"effect": "gravity"}, {"effect": "spring", "weight": 1e4}]
-    start = {"mesh": {"kind": "cloth", "rows": 5, "columns": 5, "plane": "xz", "lift": 0.3}}
-    floor = trajectory(make_scene(*effects, {"effect": "floor"}, frames=40, **start))
-    plane = trajectory(make_scene(*effects, {"effect": "plane"}, frames=40, **start))
-    assert floor[..., 1].min() >= 0.0
-    assert np.abs(floor[-1, :, 1]).max() < 1e-12
-    assert np.abs(plane - floor).max() < 1e-9
-
-
 LOW, HIGH = np.array([-0.5, 1.0, -0.5]), np.array([0.7, 2.0, 0.5])
 BODIES = {"floor": {"height": 0.3}, **OBSTACLES}
 
@@ -146,25 +134,3 @@ def test_corners_are_on_the_surface_that_keeps_vertices_out(name):
     assert np.abs(depths(contact, body(name).points)).max() < 1e-12
     inside, outside = depths(contact, np.array([[0.0, 0.0, 0.3], [0.0, 9.0, 0.0]]))
     assert outside < 0.0 < inside
-
-
-@pytest.mark.parametrize("name", ["sphere", "box"])
-def test_a_body_is_closed_and_turned_outwards(name):
-    """Every edge has a triangle on each side; the enclosed volume is that of the formula."""
-    made = body(name)
-    ends = np.sort(made.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    assert (np.unique(ends, axis=0, return_counts=True)[1] == 2).all()
-    volume = np.linalg.det(made.points[made.triangles]).sum() / 6.0
-    exact = {"sphere": 4.0 / 3.0 * np.pi * 0.7**3, "box": 1.1**3}[name]
-    assert volume == pytest.approx(exact, rel=0.01)
-
-
-@pytest.mark.parametrize("name", ["floor", "plane"])
-@given(seed=SEEDS)
-def test_a_plane_covers_the_region(name, seed):
-    made = body(name)
-    point = np.random.default_rng(seed).uniform(LOW, HIGH)
-    centre, sides = made.points.mean(axis=0), made.points[[1, 3]] - made.points[0]
-    along = sides @ (point - centre) / np.einsum("ij,ij->i", sides, sides)
-    assert np.abs(along).max() <= 0.5 + 1e-12
-    assert abs(sides[0] @ sides[1]) < 1e-12

@@ -111,13 +111,6 @@ def test_a_reader_that_waits_is_ended(square, monkeypatch):
         read_mesh_file(square)
 
 
-def test_an_interrupt_ends_the_reader(square, monkeypatch):
-    script = "import os, signal\nos.kill(os.getppid(), signal.SIGINT)\nsignal.pause()"
-    replaced(monkeypatch, script)
-    with pytest.raises(KeyboardInterrupt):
-        read_mesh_file(square)
-
-
 def test_a_file_is_read_once_as_long_as_it_stays(square, monkeypatch):
     started = []
     run = subprocess.run

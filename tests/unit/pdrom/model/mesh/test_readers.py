@@ -212,13 +212,6 @@ def test_a_mesh_of_the_plane_lies_at_z_0(tmp_path):
     assert cells.tolist() == TRIANGLES
 
 
-def test_a_whole_last_face_without_an_end_of_line_is_read_also_among_polygons(tmp_path):
-    sides = "f 2 1 5\nf 3 2 5\nf 4 3 5\nf 1 4 5"
-    for faces in (f"f 1 2 3 4\n{sides}", f"{sides}\nf 1 2 3 4"):
-        (tmp_path / "a.obj").write_text(f"{V}v .5 1 .5\n{faces}")
-        assert len(read_here(tmp_path / "a.obj")[1]) == 6
-
-
 def test_strings_of_a_binary_vtk_are_left_out(tmp_path):
     """Each stands behind its length, in one byte or in two."""
     mesh, path, grid = write_mesh(tmp_path / "a.vtk"), tmp_path / "a.vtk", b"UNSTRUCTURED_GRID\n"
@@ -341,20 +334,3 @@ def test_pieces_of_a_vtu_are_joined_and_what_follows_its_end_is_left_out(tmp_pat
 @pytest.mark.parametrize("code", ["utf-8-sig", "utf-16"])
 def test_a_byte_order_mark_is_skipped(tmp_path, code):
     square(tmp_path / "a.obj", (V + "f 1 2 3\nf 1 3 4\n").encode(code))
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "why"),
-    [
-        ("a.mesh", "MFEM mesh v1.0\n\ndimension\n2\n", "'MFEM mesh v1.0': not Medit's .mesh"),
-        ("a.msh", "(0 grid by ANSYS)\n", "'(0 grid by ANSYS)'; Gmsh's formats"),
-        ("a.mesh", MEDIT.replace("End", "TrianglesP2\n0\nEnd"), "elements of higher order"),
-        ("a.mesh", MEDIT.replace("End", "En"), "the end mark `End` is missing"),
-        ("a.vtu", VTU.replace("UnstructuredGrid", "PolyData"), "holds a PolyData"),
-        ("a.vtu", VTU.format(piece(2).replace("5 5<", "12 5<")), "holds hexahedra"),
-        ("a.vtk", legacy("STRUCTURED_GRID", ""), "holds DATASET STRUCTURED_GRID"),
-    ],
-)
-def test_other_programs_and_cells_are_named_with_a_way_out(tmp_path, name, content, why):
-    (tmp_path / name).write_text(content)
-    assert why in refusal(tmp_path / name)
