@@ -64,11 +64,8 @@ def on_mesh(scene: Scene, mesh: Mesh) -> Coarser:
     A coarse vertex gets the masses of the fine ones in the shares in which these take its
     displacement, so that the mass and its centre stay.
 
-    Raises
-    ------
-    SceneError, MeshError
-        ``mesh`` is faulty, has no fewer vertices, fills another space, or has a vertex that no
-        vertex of the scene is near to; an effect does not suit it.
+    SceneError or MeshError if ``mesh`` is faulty, has no fewer vertices, fills another space, or
+    has a vertex that no vertex of the scene is near to, or if an effect does not suit it.
     """
     own, where = scene.mesh, f"scene '{scene.config.name}': the coarser mesh"
     kinds = [CELLS[len(each.tetrahedra) > 0] for each in (mesh, own)]
@@ -124,17 +121,11 @@ def spacing(mesh: Mesh) -> float:
 def mesh_error(spacings: Sequence[float], runs: Sequence[np.ndarray]) -> float | None:
     """Estimate the error of the finest of three meshes, relative to the motion, by Richardson.
 
-    With an error C h^p of a mesh of spacing h, the differences of three runs tell C and p.
+    With an error C h^p of a mesh of spacing h, the differences of three runs tell C and p; None if
+    the order p is outside `ORDERS`, or nothing moves.
 
-    Parameters
-    ----------
     spacings : of three meshes, the finest first
     runs : (F + 1, N, 3) m each, converged, at the vertices of the finest mesh
-
-    Returns
-    -------
-    float or None
-        None if the observed order p is outside `ORDERS`, or nothing moves.
     """
     first, second, third = spacings
     near, far = (float(np.linalg.norm(a - b)) for a, b in pairwise(runs))

@@ -34,18 +34,9 @@ def shape_residuals(
     """Return differences R q + t - q_ref in each of F frames after the best rigid motion R, t.
 
     R is the rotation, never a reflection, with the least mass-weighted squares (Kabsch 1976), t
-    aligns the centres of mass.
-
-    Parameters
-    ----------
-    positions, reference : (F, N, 3) m, finite: the q and the q_ref
-    masses : (N,) kg
-
-    Returns
-    -------
-    residuals, scale
-        (F, N, 3) differences divided by ``scale`` (F,) m, which is at least every coordinate of the
-        frame, as squares of differences in metres may overflow.
+    aligns the centres of mass. ``positions`` q and ``reference`` q_ref are (F, N, 3) m, finite,
+    ``masses`` (N,) kg. The differences (F, N, 3) are divided by the second result, (F,) m, which is
+    at least every coordinate of the frame, as their squares in metres may overflow.
     """
     largest = np.abs(positions).max(initial=0.0, axis=(1, 2), keepdims=True)
     scale = np.maximum(largest, np.abs(reference).max(initial=0.0, axis=(1, 2), keepdims=True))

@@ -197,16 +197,10 @@ class Scene:
 
     @classmethod
     def build(cls, config: SceneConfig, mesh: Mesh, masses: np.ndarray | None = None) -> "Scene":
-        """Return the scene of ``config`` on ``mesh``.
+        """Return the scene of ``config`` on ``mesh``; ``masses`` (N,) kg replace its own if given.
 
-        Parameters
-        ----------
-        masses : (N,) kg, instead of the masses in ``config``
-
-        Raises
-        ------
-        MeshError, SceneError
-            The mesh is faulty, a selection empty, frames too many, or effects are in conflict.
+        MeshError if the mesh is faulty, SceneError if a selection is empty, frames are too many, or
+        effects are in conflict.
         """
         check_mesh(mesh, config.name)
         if config.frames * mesh.vertices > MAX_VERTEX_FRAMES:
@@ -244,10 +238,7 @@ class Scene:
     def changed(self, **keys: Any) -> "Scene":
         """Return the scene with ``keys`` of its configuration changed; mesh and masses are kept.
 
-        Raises
-        ------
-        MeshError, SceneError
-            A changed effect does not suit the mesh or is in conflict with another effect.
+        SceneError if a changed effect does not suit the mesh or is in conflict with another one.
         """
         config = self.config.model_copy(update=keys)
         return self._bound(config, self.mesh, self.masses)

@@ -165,17 +165,9 @@ class ConstraintGroup(Effect):
     def restricted(
         self, elements: np.ndarray, factors: np.ndarray
     ) -> tuple["ConstraintGroup", np.ndarray]:
-        """Return a group `for_run` of the given ``elements`` only, on the vertices that they use.
+        """Return a group `for_run` of the given ``elements`` (m,) only, and the vertices it uses.
 
-        Parameters
-        ----------
-        elements : (m,) element indices
-        factors : (m,) factors by which the element weights are multiplied
-
-        Returns
-        -------
-        group, vertices
-            The smaller group, and the indices (n,) of its vertices in the original mesh.
+        Weights are multiplied by ``factors`` (m,); vertices (n,) are indices of the whole mesh.
         """
 
     def system_matrix(self) -> sparse.csr_array:

@@ -15,6 +15,7 @@ from pdrom.model.constraints import lanes
 from pdrom.model.constraints import local_kernel as kernels
 from pdrom.model.constraints.base import ConstraintGroup, GroupConfig, directions, require_cells
 from pdrom.model.constraints.local_kernel import OWN, VERTICES, LocalKernel
+from pdrom.model.constraints.simplex import copy_rows, store_projections
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
 # Length below which a unit vector's component orthogonal to the vertex normal is only round-off.
@@ -138,9 +139,7 @@ def project_vertices(y_place, p_place, record):
             )
         lanes.take(manifold, MANIFOLD, elements, begin, taken)
         _half_spheres(work, taken, 0)
-        for lane in range(min(lanes.LANES, count - begin)):
-            i = 3 * (begin + lane)
-            p[i], p[i + 1], p[i + 2] = lanes.load(work, P, lane)
+        store_projections(work, 1, begin, p, P)
     return 0.0
 
 
@@ -192,13 +191,9 @@ def project_gradients(d_place, manifold_place, p_place, m):
     manifold = rows.doubles(manifold_place, blocks * MANIFOLD * lanes.LANES)
     work = np.zeros(SIZE * lanes.LANES)
     for block in range(blocks):
-        for lane in range(lanes.LANES):
-            i = 3 * min(block * lanes.LANES + lane, m - 1)
-            lanes.save(work, H, lane, (d[i], d[i + 1], d[i + 2]))
+        copy_rows(d, 1, block * lanes.LANES, work, H)
         _half_spheres(work, manifold, block)
-        for lane in range(min(lanes.LANES, m - block * lanes.LANES)):
-            i = 3 * (block * lanes.LANES + lane)
-            p[i], p[i + 1], p[i + 2] = lanes.load(work, P, lane)
+        store_projections(work, 1, block * lanes.LANES, p, P)
 
 
 def interior_vertices(triangles: np.ndarray, vertices: int) -> np.ndarray:

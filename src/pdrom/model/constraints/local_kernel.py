@@ -60,15 +60,10 @@ def _call(address, y, out, record):
 class LocalKernel:
     """A compiled local step with its data.
 
-    Parameters
-    ----------
     function : result of `local_kernel`; it is compiled when its address is first needed
     vertices : number of vertices
-    arrays, numbers : the record contains, from `OWN` on, the numbers and the arrays' addresses
-
-    Attributes
-    ----------
-    record : int64 array that is passed to the function; the object keeps the ``arrays`` alive
+    record : int64 array that is passed to the function; from `OWN` on it has the ``numbers`` and
+        the addresses of the ``arrays``, which the object keeps alive
     """
 
     def __init__(

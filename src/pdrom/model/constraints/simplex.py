@@ -218,13 +218,13 @@ def scatter(work, corners, block, edges, rhs):
 
 
 @lane_function
-def store_projections(work, count, start, p):
-    """Copy the projections of a block, in ``work``, to the flat array ``p`` from element ``start``
-    on; each element has ``count`` rows of three numbers."""
+def store_projections(work, count, start, p, first=P):
+    """Copy the projections of a block, at offset ``first`` of ``work``, to the flat array ``p``
+    from element ``start`` on; each element has ``count`` rows of three numbers."""
     for lane in range(min(LANES, len(p) // (3 * count) - start)):
         for i in range(count):
             at_p = 3 * (count * (start + lane) + i)
-            p[at_p], p[at_p + 1], p[at_p + 2] = load(work, P + 3 * i, lane)
+            p[at_p], p[at_p + 1], p[at_p + 2] = load(work, first + 3 * i, lane)
 
 
 # Kernels visit elements in mesh order if blocks of `LANES` elements then have at most KEPT times

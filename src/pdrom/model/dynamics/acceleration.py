@@ -139,12 +139,7 @@ NO_HISTORY = None
 class Anderson:
     """Anderson acceleration of the iterations of one step loop.
 
-    Parameters
-    ----------
     window : largest number of differences of earlier iterates that are combined
-
-    Attributes
-    ----------
     history : arrays for the compiled functions `refuse` and `combine`
     """
 

@@ -77,14 +77,9 @@ def inertia_energy(y, s, inertia):
 class CompiledIterations:
     """Compiled iterations of a step loop in which every local step has a local kernel.
 
-    Parameters
-    ----------
     local_steps : objects with an attribute ``local_kernel``
     inertia : (N,) M / h^2
     acceleration : Anderson acceleration; the step loop calls its ``begin_frame`` in each frame
-
-    Attributes
-    ----------
     compiled_arguments : those arguments of `all_iterations` that are equal in all frames
     """
 
@@ -113,8 +108,7 @@ class CompiledIterations:
         """Compute iterations ``which`` of the K = ``iterations`` of a frame; change ``y`` in place.
 
         objective : (K,) receives the objective at the iterates, J; empty if it is not tracked
-        y, base : iterate and (M/h^2) s, (N, 3) views of arrays (N, 4) with a column of zeros
-        s : (N, 3) prediction
+        y, s, base : iterate, prediction and (M/h^2) s, (N, 3) views of arrays with a fourth column
         elimination : the factored system, one for which `takes` returns True
         seconds : (4,) s; the times of local and global steps are added to entries 1 and 2
         """

@@ -93,10 +93,6 @@ class Translate(Hold):
 
     moves = True
 
-    def path(self, frames: range, anchor: np.ndarray) -> np.ndarray:
-        done = np.array([self.config.progress(frame) for frame in frames])
-        return anchor + done[:, None, None] * np.array(self.config.offset)
-
     def targets(self, frame: int, anchor: np.ndarray) -> np.ndarray:
         return anchor + self.config.progress(frame) * np.array(self.config.offset)
 

@@ -24,13 +24,9 @@ SEAM = 1e-6
 def check_mesh(mesh: Mesh, name: str) -> Mesh:
     """Return ``mesh``; raise an error for its first fault, with ``name`` in front of the message.
 
-    Raises
-    ------
-    MeshError
-        No cells, indices out of range, NaN or Inf, unreferenced or repeated vertices, a repeated
-        element, an edge of more than two triangles or a face of more than two tetrahedra.
-    DegenerateElementError
-        An element with a repeated vertex, or with zero area or volume at rest.
+    MeshError: no cells, indices out of range, NaN or Inf, unreferenced or repeated vertices, a
+    repeated element, an edge of more than two triangles or a face of more than two tetrahedra.
+    DegenerateElementError: an element with a repeated vertex, or zero area or volume at rest.
     """
     cells = mesh.tetrahedra if len(mesh.tetrahedra) else mesh.triangles
     kind = "tetrahedron" if len(mesh.tetrahedra) else "triangle"
@@ -47,10 +43,7 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
 def mesh_of(points: np.ndarray, cells: np.ndarray, name: str) -> Mesh:
     """Return a mesh of ``points`` (N, 3) m, ``cells`` (n, 3 or 4); tetrahedra get volumes > 0.
 
-    Raises
-    ------
-    MeshError, DegenerateElementError
-        An index is out of range, or repeated in a cell; ``name`` begins the message.
+    MeshError, which ``name`` begins, if an index is out of range or repeated in a cell.
     """
     if cells.shape[1] == 3:
         check_indices(cells, len(points), "triangle", name=name)

@@ -183,11 +183,8 @@ class MeshFile(MeshModel):
     def build(self, root: Path) -> Mesh:
         """Return the mesh of the file in the folder ``root``, with consistently oriented triangles.
 
-        Raises
-        ------
-        MeshError, DegenerateElementError
-            The file is unreadable or the mesh faulty, see `read_mesh_file` and `check_mesh`, or a
-            surface is not orientable.
+        MeshError if the file is unreadable, see `read_mesh_file`, the mesh faulty, see
+        `check_mesh`, or a surface not orientable.
         """
         mesh = read_mesh_file(self.file(root))
         checks.check_range(mesh.points, self.scale, self.path)
@@ -259,17 +256,9 @@ class GivenMesh(MeshModel):
 def given_mesh(points: Any, cells: Any, name: str) -> Mesh:
     """Return the mesh of points (N, 3) m and cells; error messages begin with ``name``.
 
-    Triangles are oriented consistently, tetrahedra with positive volume. All other conditions
-    are checked when a scene is built.
-
-    Parameters
-    ----------
-    cells : triangles (T, 3) or tetrahedra (E, 4), vertex indices from 0
-
-    Raises
-    ------
-    MeshError
-        An array has a wrong shape or type, an index is out of range, a surface not orientable.
+    Cells are triangles (T, 3), which are oriented consistently, or tetrahedra (E, 4), with positive
+    volume, as vertex indices from 0. MeshError if an array has a wrong shape or type, an index is
+    out of range, or a surface not orientable; the rest is checked when a scene is built.
     """
     points = _array(points, f"{name}: points", np.float64, (3,))
     cells = _array(cells, f"{name}: cells", np.int64, (3, 4))

@@ -203,12 +203,8 @@ TOLERANCE = 1e-6  # distance to a side up to which vertices belong to it, relati
 def select_vertices(mesh: Mesh, selection: Selection) -> np.ndarray:
     """Return vertex indices (n,) int64, ascending, of a side, index list or `Shape`.
 
-    Raises
-    ------
-    SceneError
-        The selection is empty; a side, boundary loop or component does not exist; the mesh is flat
-        in the direction of a side, so that every vertex would be selected; an index is out of
-        range.
+    SceneError if the selection is empty, an index out of range, or a side, boundary loop or
+    component does not exist, or if the mesh is flat in the direction of a side.
     """
     chosen = _chosen(mesh, selection)
     if len(chosen) == 0:

@@ -1,7 +1,4 @@
-"""Obstacles: nothing ends inside or passes through, friction is Coulomb's, the floor is a plane.
-
-Their drawn surfaces are on the obstacles themselves, closed, and turned outwards.
-"""
+"""Obstacles: nothing ends inside or passes through, friction is Coulomb's; their drawn surfaces."""
 
 import numpy as np
 import pytest
