@@ -58,11 +58,8 @@ def shape_differences(
     """Return how far two runs differ in shape in each frame, as norms (F,) m.
 
     D_f(a, b)^2 is the least sum over the vertices of m_i / m |R a_i + t - b_i|^2, R a rotation, t a
-    translation, m the mean mass: of equal masses, the norm of all differences.
-
-    positions : (F, N, 3) m, a; or (N, 3) m, the same shape in all frames
-    reference : (F, N, 3) m, b
-    masses : (N,) kg
+    translation, m the mean mass: of equal masses, the norm of all differences. ``positions`` a are
+    (F, N, 3) m, or (N, 3) m of all frames, ``reference`` b (F, N, 3) m, ``masses`` (N,) kg.
     """
     positions, root = np.broadcast_to(positions, reference.shape), np.sqrt(masses / masses.mean())
     norms = [np.zeros(0)]
@@ -95,11 +92,8 @@ def deformation_error(
 
     It is 0 for the reference moved rigidly in any way, 1 for a body that does not deform at all,
     and None if the body is rigid to `RIGID` of its size or the reference has no frame. It does not
-    see errors of the rigid motion: state the error of the positions as well.
-
-    positions, reference : (F, N, 3) m, without the initial state
-    rest : (N, 3) m, the rest shape
-    masses : (N,) kg
+    see errors of the rigid motion: state the error of the positions as well. ``positions`` and
+    ``reference`` are (F, N, 3) m, without the initial state, ``rest`` (N, 3) m, ``masses`` (N,) kg.
     """
     difference = shape_differences(positions, reference, masses)
     deformed = shape_differences(rest, reference, masses)

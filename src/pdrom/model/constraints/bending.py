@@ -317,8 +317,7 @@ class VertexBending(ConstraintGroup):
         self.magnitude = np.linalg.norm(curvature, axis=1)
         cancelling = np.linalg.norm(abs(self.S) @ np.abs(points), axis=1)
         normals = np.zeros_like(curvature)
-        fans = vertex_fans(self._triangles, len(points))
-        self._fan_start, self._fan = fans
+        self._fan_start, self._fan = fans = vertex_fans(self._triangles, len(points))
         every = np.arange(self.elements)
         fan_normals(points, self.vertices, every, *fans, self._triangles, normals)
         side = np.sign(np.einsum("ij,ij->i", curvature, normals))

@@ -219,12 +219,9 @@ FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [
 
 
 def square(point: np.ndarray, normal: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:
-    """Return a square to draw a plane near the box from ``low`` to ``high`` (3,) m.
+    """Return a square to draw the plane through ``point`` near the box from ``low`` to ``high``, m.
 
     Its centre is the centre of the box projected onto the plane, its side the box diagonal.
-
-    point : (3,) m, any point of the plane
-    normal : (3,), of any length
     """
     normal = normal / np.linalg.norm(normal)
     middle, reach = 0.5 * (low + high), np.linalg.norm(high - low)

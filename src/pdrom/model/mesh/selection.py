@@ -151,10 +151,7 @@ class Complement(Shape):
         return np.setdiff1d(np.arange(mesh.vertices), _chosen(mesh, self.of))
 
 
-KINDS = (
-    "box", "sphere", "plane", "nearest", "boundary_loop", "component", "union", "intersection",
-    "complement",
-)  # fmt: skip
+KINDS = tuple(shape.model_fields["kind"].default for shape in Shape.__subclasses__())
 
 
 def _tag(value: Any) -> str | None:
