@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 
 from pdrom.model.compiled.functions import inner
 from pdrom.model.compiled.rows import doubles
-from pdrom.model.constraints import simplex
+from pdrom.model.constraints import products, simplex
 from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.constraints.lanes import LANES, take
 from pdrom.model.mesh.types import Mesh
@@ -131,8 +131,5 @@ class SingularValueGroup(simplex.SimplexGroup):
             turned = np.sign(np.linalg.det(u) * np.linalg.det(vt))
             sigma[:, 2] *= turned
             u[:, :, 2] *= turned[:, None]
-        return (u * self._reference_values(sigma)[:, None, :]) @ vt
-
-    def _reference_values(self, sigma: np.ndarray) -> np.ndarray:
-        """Singular values (e, p) of projections from those of F, the last with a sign if p = 3."""
-        return np.clip(sigma, *self.allowed)
+        nearest = np.clip if self.manifold == "clamped" else products.reference_nearest
+        return (u * nearest(sigma, *self.allowed)[:, None, :]) @ vt

@@ -7,8 +7,6 @@ area, the entries of allowed matrices, and thus of projections, have no bound.
 
 from typing import Literal
 
-import numpy as np
-
 from pdrom.model.constraints import lanes, products, singular_values, svd3, triangle_strain
 from pdrom.model.constraints.local_kernel import gradient_kernel, local_kernel
 from pdrom.model.constraints.simplex import SIZE, F, P
@@ -71,9 +69,6 @@ class TetrahedronVolume(TetrahedronGroup):
     gradient_kernel = _project_gradients
     manifold = "size"
 
-    def _reference_values(self, sigma: np.ndarray) -> np.ndarray:
-        return products.reference_nearest(sigma, *self.allowed)
-
 
 # further offsets in the working array of area constraints: columns of U, cosine and sine of the
 # rotation V, followed by the `products.SIZE` values with which module `products` works
@@ -134,6 +129,3 @@ class TriangleArea(triangle_strain.TriangleStrain):
     accumulate_kernel = _accumulate_area
     gradient_kernel = _project_area_gradients
     manifold = "size"
-
-    def _reference_values(self, sigma: np.ndarray) -> np.ndarray:
-        return products.reference_nearest(sigma, *self.allowed)
