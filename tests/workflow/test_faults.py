@@ -197,6 +197,22 @@ def test_a_job_does_not_notice_that_code_is_edited(fresh):
 MESH = "config/scenes/sheet.obj"
 
 
+@pytest.mark.parametrize("name", [MESH, "workflow/scripts/artifact.py"])
+def test_a_file_that_is_edited_while_a_job_reads_it_is_refused(name, fresh):
+    """Though the edit is undone before the job ends; the next run makes the result again."""
+    _read_mesh(fresh)
+    process = _caught_writing(fresh, "meshes", "hold", "--", RUN)
+    text = fresh.path(name).read_text()
+    fresh.path(name).write_text(f"{text}\n# edited\n")
+    fresh.path(name).write_text(text)
+    fresh.path("release").touch()
+    said, _ = process.communicate(timeout=600)
+    assert process.returncode != 0
+    assert f"{name}: edited while the run was at work; run the same" in last_lines(said)
+    assert not list(fresh.path(f"{MICRO_RESULTS}/meshes").glob("[!.]*.h5"))
+    fresh.finish(RUN)
+
+
 def _read_mesh(sandbox: Sandbox, wave: float = 0.0) -> None:
     """Let the scene read its mesh, with waves of this height (m), from the file `MESH`."""
     scene = sandbox.path("config/scenes/spring_oop.yaml")

@@ -26,10 +26,11 @@ from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, TypeAdapter
 
+from pdrom.core.errors import PdromError
 from pdrom.core.provenance import made_by
 from pdrom.core.store.checksum import digest_told
 from study.artifact.paths import Place
-from study.artifact.planned import plan
+from study.artifact.planned import SCRIPT, plan, refused
 from study.artifact.reads import EditedFiles, FileRead, Labels, Read, SettingRead, Sources, listed
 
 A = TypeVar("A", bound="Artifact")
@@ -133,13 +134,18 @@ def make(
 ) -> None:
     """Run a job of the artifact at ``address``; its files record rule, settings, code and inputs.
 
-    Raises StorageError if an input is damaged or belongs to another result (`damaged_set_aside`).
+    Raises StorageError if an input is damaged or belongs to another result (`damaged_set_aside`),
+    and PdromError if a file that the job reads was edited since the plan of the run.
     The other arguments are attributes of a `study.pipeline.plan.Job`.
     """
     made: Artifact = resolve_name(address)
     digests = map(digest_told, made.paths(job["inputs"], edited=False))
-    with recorded(made, job["settings"], labels, code, content, digests):
-        made.perform(**job)
+    try:
+        with recorded(made, job["settings"], labels, code, content, digests):
+            made.perform(**job)
+    finally:
+        for message in refused([SCRIPT, *made.paths(job["inputs"], edited=True)]):
+            raise PdromError(message)
 
 
 def declare(made: A, *parameters: str) -> A:

@@ -12,6 +12,7 @@ import marshal
 import os
 import runpy
 import sys
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
 from importlib.machinery import ModuleSpec, SourceFileLoader
@@ -26,16 +27,39 @@ PLAN, KEPT = Path(".snakemake/plan.json"), "PDROM_PLAN"
 
 
 @cache
-def plan() -> dict[str, tuple[str, str]]:
-    """Map each module to its path and text, as the plan has read them."""
+def kept() -> tuple[dict[str, tuple[str, str]], dict[str, int]]:
+    """Return what the plan has read: module -> path and text, and other file -> `changed`."""
     if place := os.environ.get(KEPT):
-        return dict(json.loads(Path(place).read_bytes()))
+        return tuple(json.loads(Path(place).read_bytes()))
     root, found = Path(__file__).resolve().parents[2], {}
     for path in sorted(path for name in PACKAGES for path in (root / name).rglob("*.py")):
         if path.is_file():  # an editor's lock file may be a link that leads nowhere
             name = ".".join(path.relative_to(root).with_suffix("").parts)
             found[name.removesuffix(".__init__")] = (str(path), path.read_bytes().decode())
-    return found
+    return found, {}
+
+
+def plan() -> dict[str, tuple[str, str]]:
+    """Map each module to its path and text, as the plan has read them."""
+    return kept()[0]
+
+
+def changed(path: Path) -> int:
+    """Time of the last change of a file or its attributes, ns, which no program can set; or 0."""
+    return path.stat().st_ctime_ns if path.is_file() else 0
+
+
+def noted(path: Path) -> Path:
+    """Return ``path`` of a file that the plan reads next; the plan notes when it was `changed`."""
+    kept()[1].setdefault(str(path), changed(path))
+    return path
+
+
+def refused(paths: Iterable[str]) -> list[str]:
+    """Message for each of the files ``paths`` that was edited since the plan of the run."""
+    known = kept()[1] if KEPT in os.environ else {}
+    edited = [p for p in map(Path, paths) if known and known[str(p)] != changed(p)]
+    return [f"{p}: edited while the run was at work; run the same command again" for p in edited]
 
 
 class _Planned(SourceFileLoader):

@@ -9,13 +9,15 @@ import io
 import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stderr
+from contextlib import contextmanager, redirect_stderr, suppress
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
+from yaml import YAMLError
+
 from pdrom.core.errors import INTERRUPTED, ConfigurationError, PdromError, reason
-from pdrom.core.yamlfile import read_yaml, shown
+from pdrom.core.yamlfile import read_yaml, require_as_written, shown
 from study.pipeline.folders import folders
 
 # Options with which Snakemake only prints or draws something and runs no job.
@@ -63,6 +65,9 @@ class CommandLine:
         lines = self.makes and not own_output
         self.more = [*(() if cores else CORES), *(LINES if lines else ()), *OPTIONS]
         self.executor: str | None = found["executor"]
+        for key, _, text in (setting.partition("=") for setting in self.settings):
+            with suppress(YAMLError):  # Snakemake takes such a value as a text
+                require_as_written(text, "--config", key)
 
     @property
     def configuration(self) -> list[str]:

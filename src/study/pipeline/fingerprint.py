@@ -18,7 +18,7 @@ from typing import Any
 from pdrom.core.errors import ConfigurationError, StorageError
 from pdrom.core.registry import Registry
 from pdrom.core.store import write_text
-from study.artifact.planned import PACKAGES, SCRIPT, plan
+from study.artifact.planned import PACKAGES, SCRIPT, noted, plan
 
 # Modules that only define paths of files. They are left out of fingerprints, so that a new kind of
 # file causes no reruns; Snakemake itself notices if the paths of a job's files change.
@@ -158,7 +158,7 @@ def digest_of_code(tree: ast.Module, module: str = "") -> str:
 
 def digest(root: Path, *names: str) -> str:
     """Checksum (16 hexadecimal digits) of the hand-edited files ``names`` below ``root``."""
-    files = [root / name for name in names]
+    files = [noted(root / name) for name in names]
     content = b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files if f.is_file())
     return hashlib.sha256(content).hexdigest()[:16]
 
@@ -173,7 +173,7 @@ def track_scripts(workflow: Any) -> None:
 
     for rule in workflow.rules:
         if rule.script:
-            text = Path(SCRIPT).read_text(encoding="utf-8")
+            text = noted(Path(SCRIPT)).read_text(encoding="utf-8")
             rule.set_params(script=digest_of_code(ast.parse(text))[:16])
     # Snakemake sets its triggers of reruns later; this property leaves out `CODE` (changed scripts)
     type(workflow).rerun_triggers = property(

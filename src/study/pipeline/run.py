@@ -104,7 +104,7 @@ class Run:
             extra={"expected": expected},
         )
         with one_line():
-            write_text(json.dumps(planned.plan()), planned.PLAN, with_checksum=False)
+            write_text(json.dumps(planned.kept()), planned.PLAN, with_checksum=False)
         os.environ[planned.KEPT] = str(planned.PLAN.absolute())
         if workflow.local_exec:
             start_server()

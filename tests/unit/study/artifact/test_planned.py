@@ -38,7 +38,7 @@ def test_a_job_imports_what_the_plan_has_read(owner, tmp_path):
     path, kept = plan()[MODULE][0], tmp_path / "plan.json"
     for word in ("planned", "planned again"):
         text = f"print('{word}', __file__)"
-        kept.write_text(json.dumps({**plan(), MODULE: (path, text)}))
+        kept.write_text(json.dumps([{**plan(), MODULE: (path, text)}, {}]))
         done = subprocess.run(
             [sys.executable, "-c", owner], cwd=tmp_path,
             env={**os.environ, KEPT: str(kept)}, capture_output=True, text=True, check=True,
