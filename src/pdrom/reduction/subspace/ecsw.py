@@ -129,6 +129,7 @@ SKETCH = 60
 # Samples are chosen among CANDIDATES elements, or up to MOST if a tolerance is missed: equations of
 # all elements of a large mesh would not fit into memory, and neighbouring elements are similar.
 CANDIDATES, MOST = 10_000, 20_000
+BATCH = 8  # frames whose equations are hashed together
 ROUNDOFF = 10.0  # forces up to this multiple of the estimated round-off count as none
 SEED = 0
 
@@ -242,19 +243,23 @@ def training_equations(
     size = min(SKETCH * columns.B.shape[1], equations)
     generator = np.random.default_rng(SEED)
     rows, sums, norm = np.zeros((len(elements), size + 1)), np.zeros(size + 1), 0.0
-    shape, last = (group.elements, group.rows_per_element, -1), None
-    for lifted, differences, sums_of_all in _forces(group, columns.B, training):
-        if lifted is not last:
-            own, last = np.ascontiguousarray(lifted.reshape(shape)[elements]), lifted
-        norm += float(np.sum(sums_of_all**2))
-        entries = lifted.shape[1], 3
-        drawn = [
-            (generator.integers(size, size=entries), generator.choice([-1.0, 1.0], entries))
-            for _ in range(differences.shape[1] // 3)
-        ]
-        buckets, signs = (np.hstack(part) for part in zip(*drawn, strict=True))
-        np.add.at(sums, buckets, signs * sums_of_all)
-        _hash_equations(own, differences.reshape(shape)[elements], buckets, signs, rows)
+    shape, made = (group.elements, group.rows_per_element, -1), _forces(group, columns.B, training)
+    for _, batch in groupby(enumerate(made), key=lambda own: (own[0] // BATCH, id(own[1][0]))):
+        parts = []
+        for _, (lifted, differences, sums_of_all) in batch:
+            norm += float(np.sum(sums_of_all**2))
+            entries = lifted.shape[1], 3
+            drawn = [
+                (generator.integers(size, size=entries), generator.choice([-1.0, 1.0], entries))
+                for _ in range(differences.shape[1] // 3)
+            ]
+            buckets, signs = (np.hstack(part) for part in zip(*drawn, strict=True))
+            np.add.at(sums, buckets, signs * sums_of_all)
+            parts.append((differences.reshape(shape)[elements], buckets.astype(np.uint32), signs))
+        ends = np.cumsum([own.shape[1] for *_, own in parts])
+        factors = np.ascontiguousarray(lifted.reshape(shape)[elements])
+        whole = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+        _hash_equations(factors, *whole, ends, rows)
     if norm > 0.0:
         rows /= np.sqrt(norm)
         sums /= np.sqrt(norm)
@@ -264,19 +269,26 @@ def training_equations(
 
 
 @compiled
-def _hash_equations(lifted, differences, buckets, signs, out):
+def _hash_equations(lifted, differences, buckets, signs, ends, out):
     """Add the equations of each element to the rows ``buckets`` of ``out``, times ``signs``.
 
     Equation (k, n) of element e is the product of lifted[e, :, k] and differences[e, :, n]. Shapes:
-    lifted (m, p, K'), differences (m, p, n), buckets and signs (K', n), out (m, size).
+    lifted (m, p, K'), differences (m, p, n), buckets and signs (K', n), out (m, size). ``ends`` are
+    the last n of each frame, exclusive. Frames are in the inner loop, as ``out`` exceeds the cache.
     """
+    values = np.empty(differences.shape[2])
     for e in range(out.shape[0]):
-        for k in range(lifted.shape[2]):
-            for n in range(differences.shape[2]):
-                value = 0.0
+        first = 0
+        for last in ends:
+            for k in range(lifted.shape[2]):
+                values[first:last] = 0.0
                 for row in range(lifted.shape[1]):
-                    value += lifted[e, row, k] * differences[e, row, n]
-                out[e, buckets[k, n]] += signs[k, n] * value
+                    factor = lifted[e, row, k]
+                    for n in range(first, last):
+                        values[n] += factor * differences[e, row, n]
+                for n in range(first, last):
+                    out[e, buckets[k, n]] += signs[k, n] * values[n]
+            first = last
 
 
 log = logging.getLogger(__name__)
@@ -306,7 +318,9 @@ def _search(
                 break
             # the fit of hashed equations is a little better than that of all
             aim = min(aim, search.relative_residual) * max(0.5, min(0.9, tolerance / left))
-        found[tolerance] = *search.solution(), residual(*search.solution())
+        else:
+            left = residual(*search.solution())
+        found[tolerance] = *search.solution(), left
         missed = found[tolerance][2] > tolerance > 0.0
         log.log(
             logging.WARNING if missed else logging.INFO,
@@ -345,18 +359,14 @@ class _ActiveSet:
         self._target = np.empty(self._most)
         self._active: list[int] = []
         self._values = np.zeros(0)
+        self._residual = b  # b - G x, (m,)
         self._alone = False
-
-    @property
-    def _residual(self) -> np.ndarray:
-        """Residual b - G x, (m,)."""
-        return self._b - self._columns[:, : len(self._active)] @ self._values
 
     @property
     def relative_residual(self) -> float:
         """Relative residual || G x - b || / || b ||; 0 if b = 0."""
-        left = self._residual
-        found = (float(np.linalg.norm(left[part])) / size for part, size in self._parts)
+        residuals = ((self._residual[part], size) for part, size in self._parts)
+        found = (float(np.linalg.norm(own)) / size for own, size in residuals)
         return max(found, default=0.0)
 
     def solution(self) -> tuple[np.ndarray, np.ndarray]:
@@ -374,6 +384,7 @@ class _ActiveSet:
             joined = [int(c) for c in block if self._add(int(c))]
             if joined:
                 self._solve()
+                self._residual = self._b - self._columns[:, : len(self._active)] @ self._values
             staying = set(self._active).intersection(joined)
             # exclude a column that `_add` or `_solve` rejected on its own: it would be chosen again
             if len(block) == 1 and not staying:
