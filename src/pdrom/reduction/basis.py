@@ -135,9 +135,8 @@ def compute_basis(
     mean, error, shown = np.zeros(len(matrix)), roundoff, matrix
     if spec.centring == "affine":
         # The mean of n snapshots has a rounding error of at most n eps/2 times the mean of their
-        # magnitudes (Higham 2002, section 4.2). Every centred snapshot has this error; `rounded`
-        # bounds its Frobenius norm over all n. Without this bound, constant snapshots would get
-        # modes of round-off. Subtracting the first snapshot makes no such error.
+        # magnitudes (Higham 2002, section 4.2), and so has every centred snapshot. Without this
+        # bound of its norm over all n, constant snapshots would get modes of round-off.
         rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
         mean, error = matrix.mean(axis=1), max(roundoff, rounded)
         # with this centring an axis (x, y, z) with constant snapshots counts as inactive, see below
@@ -212,8 +211,8 @@ def _check(
 def _per_axis(centred: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Return one POD basis per axis as (modes, singular values, rank of each axis).
 
-    Singular values of an axis up to ``noise`` do not count for its rank, and modes beyond the rank
-    are zero. The returned singular value k is the 2-norm of the k-th ones of the three axes.
+    Modes of an axis beyond its rank are zero. The returned singular value k is the 2-norm of the
+    k-th ones of the three axes.
     """
     n, m = centred.shape
     modes = np.zeros((n, min(n // 3, m)))
@@ -233,9 +232,9 @@ def _mean_in_modes(
 ) -> np.ndarray:  # fmt: skip
     """Scale modes ``v``, add the snapshot ``first`` to each, and orthonormalise per axis by QR.
 
-    The scale is the standard deviation of all entries of ``centred``. An axis with fewer
-    independent columns than modes is completed by Householder vectors, which are orthonormal but do
-    not come from the data. The program published with the preprint does the same.
+    The scale is the standard deviation of all entries of ``centred``. As in the program published
+    with the preprint, an axis with fewer independent columns than modes is completed by Householder
+    vectors, which do not come from the data.
     """
     if v.shape[1] == 0:
         return v
@@ -252,9 +251,8 @@ def _mean_in_modes(
 def pod(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Left singular vectors and singular values of ``matrix`` (n, m), min(n, m) of each.
 
-    A tall matrix is first reduced by a QR factorisation, A = Q R, and R is decomposed: backward
-    stable like the SVD of A itself (Chan 1982), unlike the eigenvalues of A^T A, which lose all
-    singular values below sqrt(eps) sigma_1. Each vector's entry of largest magnitude is positive.
+    A tall matrix is first reduced by a QR factorisation (Chan 1982), which is backward stable,
+    unlike the eigenvalues of A^T A. Each vector's entry of largest magnitude is positive.
     """
     if matrix.shape[0] > matrix.shape[1]:
         q, second, r = thin_qr(matrix)
@@ -289,10 +287,9 @@ def thin_qr(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     Householder reflections read A once per column and wait for memory. Here (Terao, Ozaki and
     Ogita 2020) LU with partial pivoting, A = P L U, leaves a well-conditioned L, and two Cholesky
-    factorisations of Gram matrices make it orthonormal: P L = Q_1 R_1, Q_1 = Q R_2, R = R_2 R_1 U.
-    If L is ill-conditioned, so that Q_1 is not orthonormal up to `DEPARTURE`, Householder
-    reflections factor A instead. If L is well-conditioned, R has the error of the LU factorisation,
-    about eps cond(L) relative to each column of A.
+    factorisations of Gram matrices make it orthonormal: P L = Q_1 R_1, Q_1 = Q R_2, R = R_2 R_1 U,
+    with an error of about eps cond(L) in each column. Reflections factor A if L is ill-conditioned,
+    so that Q_1 is not orthonormal up to `DEPARTURE`.
     """
     lower, swaps, _ = linalg.lapack.dgetrf(np.array(matrix, order="F"), overwrite_a=True)
     m = matrix.shape[1]
@@ -320,9 +317,8 @@ def _by_reflections(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
 def numerical_rank(singular_values: np.ndarray, shape: tuple[int, int], roundoff: float) -> int:
     """Number of ``singular_values`` (n,) of a matrix of ``shape`` that exceed two round-off levels.
 
-    The relative level max(shape) eps sigma_1 is the backward error of the SVD. The absolute level
-    ``roundoff`` is the error of the data themselves: if a projection is the difference of
-    cancelling terms, all of its singular values may be noise although they decay smoothly.
+    The relative level max(shape) eps sigma_1 is the backward error of the SVD; the absolute level
+    ``roundoff`` is the error of the data, which may be differences of cancelling terms.
     """
     if len(singular_values) == 0:
         return 0

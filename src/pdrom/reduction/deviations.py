@@ -119,8 +119,7 @@ class Yardstick:
     def units(self) -> dict[str, float]:
         """Extent norm and `rest_size`, m: keyword arguments of `errors_within`.
 
-        The extent norm is the Frobenius norm of a shift of all N vertices by the mesh's longest
-        side: sqrt(N) times that side.
+        The extent norm is that of a shift of all N vertices by the mesh's longest side.
         """
         mesh = self.scene.mesh
         size = metrics.rest_size(mesh.points, self.scene.masses)

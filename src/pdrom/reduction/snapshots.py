@@ -34,8 +34,8 @@ def stored_frames(frames: int, count: int) -> np.ndarray:
 def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
     """Lumped mass (e p,) kg of each operator row: e elements of p rows, vertex ``masses`` (N,) kg.
 
-    Every vertex divides its mass equally among the elements that contain it, so that the element
-    masses sum to the mass of all vertices of elements; each row has the mass of its element.
+    Every vertex divides its mass equally among the elements that contain it; each row has the mass
+    of its element.
     """
     element = touched_vertices(group)
     valence = np.asarray(element.sum(axis=0)).ravel()
@@ -53,11 +53,10 @@ def touched_vertices(group: ConstraintGroup) -> sparse.csr_array:
 def recorded(
     scene: Scene, group: str, state: State, frames: int | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run a scene in full order from ``state``, and project the last iterate of every frame.
+    """Run a scene in full order from ``state``; return, of the first ``frames`` (None: all):
 
-    Return, for the first ``frames`` frames (None: all), positions (F + 1, N, 3) m, projections
-    (F, e p, 3) of the constraint ``group`` with e elements of p rows in the last local step of
-    every frame, and norms (F,) of their rounding errors.
+    positions (F + 1, N, 3) m, projections (F, e p, 3) of the constraint ``group`` with e elements
+    of p rows in the last local step of every frame, and norms (F,) of their rounding errors.
     """
     loop, positions = scene.stepper(track_objective=False), [state.positions]
     own, projections, roundoff = loop.local_step(group), list[np.ndarray](), list[float]()

@@ -29,15 +29,16 @@ class Selection(ABC):
         """
 
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
-        """Extend the ``chosen`` blocks to ``count`` blocks by GappyPOD+E.
+        """Extend the ``chosen`` blocks (m,) of ``v`` (size e, r) to ``count``, by GappyPOD+E."""
+        return oversample(v, size, chosen, count)
 
-        Parameters
-        ----------
-        v : (size e, r) modes
-        chosen : (m,) blocks that are already selected
-        size : number of rows of a block
-        """
-        return oversample(v, size, chosen, count=count)
+
+class Greedy(Selection):
+    """DEIM by entries or elements; the samples for r modes begin with those for fewer modes."""
+
+    def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
+        path = deim_entries(v) if size == 1 else block_elements(v, size)
+        return {r: path[:r] for r in ranks}
 
 
 # Of residual entries that differ by less than this fraction, `tie_weights` may favour the first.
@@ -47,14 +48,10 @@ TIE = 1e-6
 def deim_entries(v: np.ndarray) -> np.ndarray:
     """Greedy DEIM entries of the basis ``v`` (n, r): min(n, r) indices, the first k for k modes.
 
-    The k-th residual v_k - V_{k-1} (P^T V_{k-1})^-1 P^T v_k, where P^T selects the k - 1 earlier
-    entries, vanishes at these. The entry where its magnitude, times the weights w of `tie_weights`,
-    is largest comes next. These are the pivots of an LU factorisation of diag(w) V with partial
-    pivoting (Sorensen and Embree 2016, section 3), which LAPACK does in blocks: multiplying row i
-    by w_i multiplies its residuals by w_i only.
-
-    The entries are always distinct. For a mode that depends on the earlier ones, the residual is
-    round-off and its entry is arbitrary.
+    The entry where the residual v_k - V_{k-1} (P^T V_{k-1})^-1 P^T v_k, times the weights w of
+    `tie_weights`, is largest follows the k - 1 earlier ones, which P^T selects. These are the
+    pivots of an LU factorisation of diag(w) V with partial pivoting (Sorensen and Embree 2016,
+    section 3), which LAPACK does in blocks. The entries are distinct, also of dependent modes.
     """
     n, r = v.shape
     weighted = np.multiply(v, tie_weights(n)[:, None], out=np.empty((n, r), order="F"))
@@ -68,9 +65,8 @@ def deim_entries(v: np.ndarray) -> np.ndarray:
 def tie_weights(n: int) -> np.ndarray:
     """Factors w (n,), falling from 1 to almost 1 - TIE, that break ties between n magnitudes.
 
-    In a symmetric motion residuals are equal up to round-off, and the largest of them would depend
-    on the order of operations. After multiplication by the factors, the first of them is largest.
-    An entry d places later is selected only if it is larger by more than the fraction TIE d / n.
+    In a symmetric motion residuals are equal up to round-off. Times the factors, the first of them
+    is largest: one d places later is selected only if it is larger by the fraction TIE d / n.
     """
     return 1.0 - TIE * np.arange(n) / n
 
@@ -82,10 +78,8 @@ class GrowingFit:
     """Least-squares fit of each mode by the earlier modes at a growing set of sampled rows.
 
     The coefficients c of mode v_k in the earlier modes V_k solve (S V_k) c = S v_k; S selects rows.
-
-    The triangular QR factor R (r, r) of the sampled rows of all modes is stored and updated when s
-    rows are added, at a cost O(s r^2); factoring all m sampled rows again would cost O(m r^2).
-    R[:k, :k] c = R[:k, k] has the same least-squares solutions as the sampled equations.
+    The triangular QR factor R (r, r) of the sampled rows of all modes is updated when s rows are
+    added, at a cost O(s r^2). R[:k, :k] c = R[:k, k] has the same least-squares solutions.
     """
 
     def __init__(self, modes: int) -> None:
@@ -112,8 +106,7 @@ def block_elements(v: np.ndarray, size: int) -> np.ndarray:
     """Indices of min(e, r) elements of a basis ``v`` (size e, r) by DEIM; k modes use the first k.
 
     Each of the e elements has ``size`` rows. Mode k is fitted by the earlier modes on the rows of
-    the elements selected so far, by least squares. The element with the largest residual norm,
-    times `tie_weights`, is selected next.
+    the elements selected so far; the element with the largest residual norm is selected next.
     """
     total = len(v) // size
     return _greedy([v], total, min(total, v.shape[1]), repeat=False)
@@ -123,11 +116,10 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
     """Greedy indices (r,) of rows (x, y, z) of a basis ``v`` (3 rows, r), the first k for k modes.
 
     For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}, where P^T selects rows.
-    An axis without modes, False in ``active``, is left out.
-    The row with the largest sum of squared residuals of the axes (times `tie_weights`) is selected
-    for all axes. It may be useless for one axis, whose system may then be singular: it is solved in
-    the least-squares sense. With ``repeat`` a row may be selected again, as in the program of the
-    preprint's authors; without it, the result has at most as many entries as the basis has rows.
+    An axis without modes, False in ``active``, is left out. The row with the largest sum of squared
+    residuals is selected for all axes. It may be useless for one axis, whose system is then solved
+    in the least-squares sense. With ``repeat`` a row may be selected again, as in the program of
+    the preprint's authors; without it, there are at most as many entries as the basis has rows.
     """
     rows, r = len(v) // 3, v.shape[1]
     axes = [v[a::3] for a in np.flatnonzero(active)]
@@ -137,9 +129,8 @@ def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndar
 def _greedy(parts: Sequence[np.ndarray], total: int, count: int, repeat: bool) -> np.ndarray:
     """Select ``count`` of ``total`` blocks of rows, each by the largest residual of the next mode.
 
-    It is the residual of a fit by the earlier modes at the blocks selected so far. ``parts`` is the
-    matrix of the modes, or one matrix per axis. Each has ``total`` blocks and is fitted separately;
-    their squared residuals are added. With ``repeat`` a block may be selected more than once.
+    ``parts`` is the matrix of the modes, or one per axis. Each is fitted separately; their squared
+    residuals, times squared `tie_weights`, are added. With ``repeat`` a block may be repeated.
     """
     fits = [(np.asfortranarray(part), GrowingFit(part.shape[1])) for part in parts]
     weights = tie_weights(total) ** 2

@@ -2,9 +2,7 @@
 
 B. Peherstorfer, Z. Drmac, S. Gugercin, Stability of discrete empirical interpolation and gappy
 proper orthogonal decomposition with randomized and deterministic sampling points, SIAM J. Sci.
-Comput. 42 (2020), section 4. Points are generalised to blocks of rows (elements). Their number
-is given, or follows from a bound on the gain 1 / sigma_min(P^T V), by which the sampled rows P^T V
-of modes V can amplify errors.
+Comput. 42 (2020), section 4. Points are generalised to blocks of rows (elements).
 """
 
 import numpy as np
@@ -16,32 +14,23 @@ from pdrom.core.errors import SamplingError
 ROUNDOFF = 1e-11
 
 
-def oversample(v: np.ndarray, size: int, elements: np.ndarray, count: int) -> np.ndarray:
-    """Extend ``elements`` to ``count`` elements (all elements, if fewer exist).
+def oversample(
+    v: np.ndarray, size: int, elements: np.ndarray, count: int = 0, bound: float = np.inf
+) -> np.ndarray:
+    """Extend ``elements`` to ``count`` elements, or more, until the gain is at most ``bound``.
 
-    Raises SamplingError if an element is repeated or out of range.
+    The gain || (P^T V)^+ ||_2 is the factor by which the elements' rows P^T V of the basis V can
+    amplify errors. With orthonormal columns the set of all elements has the gain 1, so that every
+    bound of at least 1 can be met. Return all elements if even these do not suffice.
+    SamplingError if an element is repeated or out of range.
 
-    Parameters
-    ----------
     v : (size e, r) basis, ``size`` consecutive rows for each of the e elements
     elements : distinct elements that are already selected, usually one for each mode
     """
     growing = _Growing(v, size, elements)
-    while len(growing.picked) < min(count, growing.total):
-        growing.add()
-    return np.array(growing.picked, dtype=np.int64)
-
-
-def bound_gain(v: np.ndarray, size: int, elements: np.ndarray, bound: float) -> np.ndarray:
-    """Extend ``elements`` until the gain || (P^T V)^+ ||_2 is at most ``bound``.
-
-    The gain is the factor by which the elements' rows P^T V of the basis V can amplify errors.
-    Return all elements if even these do not meet the bound. With orthonormal columns the set of all
-    elements has the gain 1, so that every bound of at least 1 can be met. ``v`` (size e, r) has
-    ``size`` rows for each element. SamplingError if an element is repeated or out of range.
-    """
-    growing = _Growing(v, size, elements)
-    while len(growing.picked) < growing.total and growing.gain > bound:
+    while len(growing.picked) < growing.total:
+        if len(growing.picked) >= count and growing.gain <= bound:
+            break
         growing.add()
     return np.array(growing.picked, dtype=np.int64)
 
@@ -60,13 +49,9 @@ class _Growing:
         self._squares = self._blocks @ self._blocks.transpose(0, 2, 1)
         self._sizes = np.trace(self._squares, axis1=1, axis2=2)
         self.picked, self.total = [int(e) for e in elements], len(self._blocks)
-        if len(set(self.picked)) < len(self.picked):
-            raise SamplingError(f"{len(elements)} elements to start with, some of them repeated")
-        if self.picked and not 0 <= min(self.picked) <= max(self.picked) < self.total:
-            raise SamplingError(
-                f"elements {min(self.picked)} to {max(self.picked)} to start with: allowed are "
-                f"0 to {self.total - 1}"
-            )
+        if len({e for e in self.picked if 0 <= e < self.total}) < len(self.picked):
+            fault = f"different elements from 0 to {self.total - 1} are required"
+            raise SamplingError(f"elements {self.picked[:5]} to start with: {fault}")
         rows = self._blocks[self.picked].reshape(-1, v.shape[1])
         self._gram = rows.T @ rows
         self._decompose()
@@ -96,11 +81,10 @@ class _Growing:
     def _strongest(self) -> int:
         """Return the unsampled element with the largest `eigenvalue_growth`.
 
-        Two upper bounds exclude most elements, so that their growth is not computed. The first is
-        |B u|^2, with the rows B of an element and the eigenvector u of the smallest eigenvalue. Let
-        g be the growth of the element with the largest |B u|^2; elements with |B u|^2 <= g are
-        excluded. So are those whose bound `_growth_at_most` is below the growth of the element with
-        the largest such bound. If none of the rest exceeds g, the element of g is returned.
+        Two upper bounds exclude most elements, so that their growth is not computed: |B u|^2, with
+        the rows B of an element and the eigenvector u of the smallest eigenvalue, compared with the
+        growth of the element where it is largest; then `_growth_at_most` in the same way. If none
+        of the rest grows more than the first of these two elements, that one is returned.
         """
         products = (self._rows @ self._weakest).reshape(self.total, -1)
         strength = np.einsum("es,es->e", products, products)
@@ -141,9 +125,8 @@ def eigenvalue_growth(
         t = 2 g |b|^2 / (g + n + sqrt((g - n)^2 + 4 g c)),   c = |C^T b|^2 / |b|^2,   n = |b|^2 + c,
 
     with C = B - b u^T, the part of B orthogonal to u. t is the smaller root of
-    t^2 - (g + n) t + g |b|^2, in a form without cancellation. Near a double root (g = n, c = 0)
-    it is accurate to all digits, while the usual form, with n = |B^T b|^2 / |b|^2 and the square
-    root of (g + n)^2 - 4 g |b|^2, loses half of them.
+    t^2 - (g + n) t + g |b|^2 without cancellation, accurate to all digits also near a double root
+    (g = n, c = 0), where the usual form loses half of them.
 
     For a single row n = |B|^2 and t is the bound of Ipsen and Nadler (2009), eq. (4.3) in
     Peherstorfer et al. (2020). For several rows: if all other eigenvalues are lowered to the second
@@ -152,8 +135,6 @@ def eigenvalue_growth(
     is convex, Jensen's inequality gives a lower bound with the mean c of the mu_i, weighted by
     beta_i^2. An infinite gap gives t = |b|^2.
 
-    Parameters
-    ----------
     blocks : (m, s, r) matrices B of m elements that may be added
     products : (m, s) vectors b = B u of these elements
     weakest : (r,) the unit vector u

@@ -1,9 +1,8 @@
 """The reduced local step: projections p(y) in S^T W p(y) become mean + V c(y), with r modes V.
 
 S has the operators of all elements, W their weights. Compiled code computes the coefficients c from
-sampled entries of p(y), then the reconstruction ("lift"). All axes x, y, z share one set of
-coefficients, or each has its own set. A column of the lift adds the reconstruction by one set of
-coefficients to one axis of the right-hand side."""
+sampled entries of p(y), then the reconstruction ("lift"). A column of the lift adds that by one set
+of coefficients, of all axes x, y, z or of one, to one axis of the right-hand side."""
 
 from copy import copy
 from dataclasses import dataclass, replace
@@ -71,12 +70,8 @@ class Lift:
 
 @compiled(nogil=True)
 def coefficients(sampled, starts, positions, packed, operators, shifts, result):
-    """Compute the coefficients, one set for all axes or one per axis, from sampled projections.
-
-    sampled : flat array of projections of the sampled elements, one element after the other
-    starts, positions, packed, operators, shifts : arrays of `Lift`
-    result : (sets, r) output
-    """
+    """Write the coefficients of ``sampled``, the flat projections of the sampled elements, to
+    ``result`` (sets, r); the other arguments are arrays of `Lift`."""
     sets, modes = shifts.shape
     for k in range(sets):
         first, last = starts[k], starts[k + 1]
@@ -100,11 +95,9 @@ def coefficients(sampled, starts, positions, packed, operators, shifts, result):
 
 @compiled(nogil=True)
 def lift(values, axes, own_sets, lifted, offset, rhs):
-    """Add S^T W (mean + V c) to the right-hand side.
+    """Add S^T W (mean + V c) to ``rhs`` (4 N,), flat, with a zero after the numbers of a vertex.
 
-    values : (sets, r) coefficients
-    axes, own_sets, lifted, offset : arrays of `Lift`
-    rhs : (4 N,) right-hand side, flat, with a zero after the three numbers of each vertex
+    ``values`` (sets, r) are the coefficients c; the other arguments are arrays of `Lift`.
     """
     for i in range(len(offset)):
         rhs[i] += offset[i]
@@ -160,18 +153,14 @@ def _accumulate(y, rhs_place, record):
 class ReducedLocalStep:
     """Local step that evaluates sampled elements and adds a reconstruction of S^T W p to rhs.
 
-    Projections p are approximated by mean + V c, with modes V. S^T W mean (N, 3), S^T W V and the
-    matrices that map samples to the coefficients c are computed before the run. An iteration gets
-    the projections of sampled elements, c by a small dense product, and the dense reconstruction.
+    S^T W mean (N, 3), S^T W V and the matrices that map samples to the coefficients c are computed
+    before the run. An iteration does the rest: projections of sampled elements and dense products.
 
-    Attributes
-    ----------
     local_kernel : the iteration in compiled form; None if the group has no compiled projections
     frame_lagged : whether the group has data that are computed once per frame (``begin_frame``)
     """
 
     def __init__(self, group: ConstraintGroup, reduction: Reduction) -> None:
-        """Precompute the arrays that ``reduction`` of ``group`` needs during a run."""
         self.name, self.frame_lagged = group.name, group.frame_lagged
         self._elements = np.ascontiguousarray(reduction.elements, dtype=np.int64)
         self._everything = len(self._elements) == group.elements

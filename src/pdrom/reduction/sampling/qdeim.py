@@ -18,12 +18,9 @@ def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
     Pivots are chosen among the columns of V^T, in groups of the ``size`` columns of an element.
     The group with the largest Frobenius norm (times `tie_weights`) is selected, and the direction
     in R^r that dominates it is projected out of all groups. For ``size`` 1 this is the published
-    method. For larger sizes, projecting out the whole group would exhaust R^r after about r / size
-    elements; one direction per element gives as many elements as modes, like the greedy selection.
-    The removed directions are orthonormal and lie in the span of the selected groups, so
-    that the sampled rows of V have full column rank.
-
-    The elements for fewer modes need not be among those for r. Cost O(n r^2), n = size e.
+    method. For larger sizes, one direction per element (the whole group would exhaust R^r) gives as
+    many elements as modes. The removed directions are orthonormal and lie in the span of the
+    selected groups, so that the sampled rows of V have full column rank. Cost O(size e r^2).
     """
     left = _Left(v, size)
     candidates = min(left.total, ROWS_A_MODE * v.shape[1] // size + 1)

@@ -11,13 +11,12 @@ from pdrom.core.errors import SamplingError
 from pdrom.reduction.basis import Basis
 from pdrom.reduction.method import SELECTIONS, MethodSpec, Solve
 from pdrom.reduction.sampling.deim import Selection, joint_rows
-from pdrom.reduction.sampling.gappy_pod_e import bound_gain
+from pdrom.reduction.sampling.gappy_pod_e import oversample
 
 
 def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarray:
     """Matrix (r, m) that maps m sampled values b to coefficients c with A c = b, A = ``a`` (m, r).
 
-    ``solve`` is one of these methods:
     square : A^-1; nan, so that a run blows up, if A is singular to working precision or not square
     qr : least squares A^+ by a QR factorisation; nan if A has not full column rank
     tikhonov : (A^T A + t I)^-1 A^T with t = ``tikhonov``, as in the preprint authors' program
@@ -68,13 +67,9 @@ class Sampling:
     def of_entries(
         cls, entries: np.ndarray, rows_per_element: int, elements: int, repeats: bool = False
     ) -> "Sampling":
-        """Sampling of ``entries``; SamplingError if out of range, or repeated without ``repeats``.
+        """Sampling of ``entries`` (m,) of a vectorised projection of all ``elements``.
 
-        Parameters
-        ----------
-        entries : (m,) indices of a vectorised projection of all ``elements``
-        rows_per_element : p
-        repeats : whether an entry may occur twice
+        SamplingError if an entry is out of range, or occurs twice without ``repeats``.
         """
         entries = np.asarray(entries, dtype=np.int64)
         size = 3 * rows_per_element
@@ -124,19 +119,15 @@ class Reduction:
     """Approximation of a group's projections by r modes, from sampled entries or from all of them.
 
     An axis whose training data are round-off has zero coefficients and does not enter the gain (the
-    amplification of errors): the preprint's method would divide round-off by round-off there. If
-    the system of any other axis is singular, the method fails: the gain is inf and the
-    reconstruction nan.
+    amplification of errors). If the system of any other axis is singular, the method fails: the
+    gain is inf and the reconstruction nan.
 
-    Attributes
-    ----------
     v : (3 e p, r) modes
     elements : elements to evaluate, in the order of ``sampling.elements``
     blocks : sets of coefficients, each with its sampled entries and its operator
     """
 
     def __init__(self, basis: Basis, sampling: Sampling, spec: MethodSpec, r: int) -> None:
-        """Build the operators of method ``spec`` from r modes of ``basis`` at ``sampling``."""
         self.basis, self.sampling, self.spec, self.r = basis, sampling, spec, r
         self.v, self.elements = basis.truncated(r), sampling.elements
         axes = [int(a) for a in np.flatnonzero(basis.active_axes)] if spec.per_axis else [None]
@@ -171,15 +162,12 @@ class Reduction:
     def gain(self) -> float:
         """Amplification of errors || (P^T V)^+ ||_2, P^T V the sampled rows; inf if singular.
 
-        With several sets of coefficients it is the largest.
-
-        For orthonormal V and distinct rows the reconstruction p^ of p satisfies || p - p^ || <=
-        gain || (I - V V^T)(p - mean) || (Chaturantabut and Sorensen 2010, lemma 3.2), also for
-        separate axes, where the parts V_a of V have norm at most 1. The Tikhonov solution is no
-        projection: its gain is the norm of its operator, the factor in the bound is
-        sqrt(1 + gain^2), and a bias is added. For rows taken up to m times sqrt(m) gain replaces
-        gain. With mass weighting V is orthonormal in the mass inner product, and the factor in that
-        norm is || (P^T V)^+ P^T M^(-1/2) ||_2; the gain remains that of sampled values.
+        With several sets of coefficients it is the largest. For orthonormal V and distinct rows the
+        reconstruction p^ of p satisfies || p - p^ || <= gain || (I - V V^T)(p - mean) ||
+        (Chaturantabut and Sorensen 2010, lemma 3.2), also for separate axes. The Tikhonov solution
+        is no projection: the factor in the bound is sqrt(1 + gain^2), and a bias is added. For rows
+        taken up to m times it is sqrt(m) gain. With mass weighting, in the norm of the masses, it
+        is || (P^T V)^+ P^T M^(-1/2) ||_2; the gain remains that of sampled values.
         """
         return self._norms[0]
 
@@ -235,7 +223,7 @@ def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[in
             selection = SELECTIONS.load(spec.selection)()
             chosen = selection.extend(v[:, :r], size, chosen, count)
         if spec.gain_bound is not None:
-            chosen = bound_gain(v[:, :r], size, chosen, bound=spec.gain_bound)
+            chosen = oversample(v[:, :r], size, chosen, bound=spec.gain_bound)
         if spec.rows == "element":
             samplings[r] = Sampling.of_elements(chosen, *counts)
         else:

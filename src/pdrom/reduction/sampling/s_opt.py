@@ -27,15 +27,9 @@ def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
     elements. In the first step S is 1 for every element; this step selects the element with the
     largest norm of the first mode, as classical DEIM does.
 
-    Parameters
-    ----------
-    v : (size e, r) basis, ``size`` consecutive rows for each of the e elements; size 1 is the
-        method of the paper
-
-    Raises
-    ------
-    SamplingError
-        A mode depends on the earlier modes at the sampled rows, whichever element is added to them.
+    ``v`` (size e, r) has ``size`` consecutive rows for each of the e elements; size 1 is the method
+    of the paper. SamplingError if a mode depends on the earlier modes at the sampled rows,
+    whichever element is added to them.
     """
     state = _Sampled(v, size)
     for mode in range(min(v.shape[1], state.total)):
@@ -53,8 +47,7 @@ class SOpt(Selection):
     def extend(self, v: np.ndarray, size: int, chosen: np.ndarray, count: int) -> np.ndarray:
         """Extend ``chosen`` to ``count`` elements, each maximising the S-measure of all modes.
 
-        Return all elements if ``count`` exceeds their number. Raise SamplingError if the modes are
-        linearly dependent at the ``chosen`` elements.
+        SamplingError if the modes are linearly dependent at the ``chosen`` elements.
         """
         count = min(count, len(v) // size)
         if count <= len(chosen):

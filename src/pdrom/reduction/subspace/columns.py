@@ -151,10 +151,9 @@ def atoms(units: Sequence[np.ndarray], vertices: int) -> list[np.ndarray]:
 def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
     """Smooth weights (N, handles) in [0, 1] at ``points`` (N, 3) m, with sum 1 at every vertex.
 
-    Handles are vertices from farthest-point sampling. At distance d a handle has Wendland's kernel
-    (1 - d/R)^4 (4 d/R + 1), zero for d > R. R is three times (for one handle: twice) the largest
-    distance of a vertex from its nearest handle, so that a kernel is positive at every vertex.
-    Kernels are divided by their sum.
+    Handles are vertices from farthest-point sampling, with Wendland's kernel
+    (1 - d/R)^4 (4 d/R + 1) of the distance d <= R, divided by the sum of all kernels. R is three
+    times (for one handle: twice) the largest distance of a vertex from its nearest handle.
     """
     chosen = farthest_points(points, np.arange(len(points)), handles)
     distance = np.linalg.norm(points[:, None, :] - points[chosen][None], axis=2)
@@ -170,12 +169,8 @@ def skinning_modes(points: np.ndarray, masses: np.ndarray, k: int) -> np.ndarray
     """k mass-orthonormal columns (N, k) in the span of w_h [1, x, y, z], without affine part.
 
     w_h are the `skinning_weights` of handle h; there are as many handles as k columns require. Of
-    more than k columns, those with the largest singular values are returned.
-
-    Parameters
-    ----------
-    points : (N, 3) m
-    masses : (N,) kg
+    more than k columns, those with the largest singular values are returned. ``points`` are
+    (N, 3) m, ``masses`` (N,) kg.
     """
     weight = np.sqrt(masses)[:, None]
     fields = affine_columns(points - points.mean(axis=0))

@@ -1,8 +1,7 @@
 """Energy-conserving sampling and weighting (Farhat et al. 2014) for projective dynamics.
 
 A few elements e with factors xi_e >= 0 represent all: sum_e xi_e g_e ~ sum_e g_e, where g_e is the
-contribution of an element to the reduced equations in all training iterates. The same factors
-weight the element in the system matrix and in the right-hand side. The reduced problem is then
+contribution of an element to the reduced equations in all training iterates. The reduced problem is
 again a projective-dynamics problem, with weights xi_e w_e >= 0. Whatever the factors, its objective
 cannot rise in an iteration: they affect the accuracy, not the stability.
 
@@ -145,9 +144,9 @@ def ecsw_elements(
 
     A tolerance bounds the relative residual of the training equations, which is computed without
     hashing and stored with the samples; it is larger where even all candidates miss the tolerance.
-    A group without any force in the training keeps all elements. In a large group, elements are
-    chosen from a random (seeded) subset, which is doubled, up to `MOST`, until all tolerances are
-    met; factors fit sums over the whole group. ``choose`` replaces the search (see `Choose`).
+    A group without any force in the training keeps all elements. In a large group, candidates are a
+    random (seeded) subset, which is doubled, up to `MOST`, until all tolerances are met. ``choose``
+    replaces the search (see `Choose`).
     """
     count, totals, force = CANDIDATES, list[np.ndarray](), False
     for frame, (_, differences, sums) in zip(
@@ -334,12 +333,11 @@ def _search(
 class _ActiveSet:
     """Search for a sparse x >= 0 with G x near b: active columns of G, and their factors.
 
-    In the active-set method of Lawson and Hanson, the columns with the largest correlation with the
-    residual are added, the least-squares problem of the active columns is solved, and columns whose
+    In the active-set method of Lawson and Hanson, the column with the largest correlation with the
+    residual is added, the least-squares problem of the active columns is solved, and columns whose
     values would be negative are removed. If many columns are active, several are added at a time,
-    to save passes over G. If all of these are removed again, a single column is added next, as in
-    the original method, which ends at the minimum. The Cholesky factor of the normal equations is
-    updated; with unit columns it is accurate enough for relative residuals down to about 1e-6.
+    to save passes over G, unless all of these were removed again the last time. The updated
+    Cholesky factor of the normal equations suffices for relative residuals down to about 1e-6.
     """
 
     def __init__(self, g: np.ndarray, b: np.ndarray, apart: int = 0) -> None:

@@ -260,8 +260,6 @@ def run_frames(
 ):  # fmt: skip
     """Compute one frame for each of ``targets`` by `run_iterations`.
 
-    Parameters
-    ----------
     positions, velocities : (F + 1, K, 3) coordinates, the first ones given, the others written
     acceleration, rate, rates : a, c, C of the acceleration a + c v + C v by all forces
     h : time step, s

@@ -4,9 +4,8 @@ Brandt, Eisemann and Hildebrandt (2018, sect. 5) represent the projections of a 
 low-dimensional space, fitted to the projections of sampled constraints by weighted least squares.
 The space needs no training: its functions are skinning weights on the elements times the rest
 vectors S q_rest, so that it contains all linear maps of the rest shape that vary slowly over the
-mesh. The source adds the weights themselves as further columns (the translations of a skinning
-space). They are left out here, since S annihilates translations and such columns would depend on
-the arbitrary local axes of each element.
+mesh. The weights themselves, which the source adds as columns for translations, are left out, since
+S annihilates translations.
 """
 
 from typing import Annotated
@@ -100,12 +99,8 @@ def projection_space(
     The rest vectors come first, so that the rest shape and its rotations are exact. They are
     followed by the leading POD modes of the products, without their part along the rest vectors.
 
-    Parameters
-    ----------
-    rest : (e p, 3) rest vectors S q_rest
-    centres : (e, 3) m, centres of the elements
-    weights : (e p,) diagonal of W
-    dimension : largest number d of columns
+    ``rest`` (e p, 3) are the rest vectors, ``centres`` (e, 3) m those of the elements, ``weights``
+    (e p,) the diagonal of W; ``dimension`` is the largest number d of columns.
     """
     root = np.sqrt(weights)[:, None]
     active = rest[:, np.linalg.norm(rest, axis=0) > DEPENDENT * np.linalg.norm(rest)]

@@ -1,8 +1,7 @@
 """Local steps in the coordinates of a position subspace, by sampling or by interpolation.
 
 Interpolation evaluates a few elements, computes coefficients c from their projections, and from c
-the right-hand side B^T S^T W (mean + V c). Products that involve all vertices or elements are
-computed before the run; the system matrix is the same as with all projections.
+the right-hand side B^T S^T W (mean + V c); the system matrix is the same as with all projections.
 """
 
 from dataclasses import dataclass

@@ -27,8 +27,6 @@ class DenseElimination:
     Raises SolverError if the block of the free coordinates is not positive definite or is solved
     inaccurately.
 
-    Parameters
-    ----------
     matrix : (K, K) matrix of the reduced system, kg/s^2
     fixed : (m,) indices of the coordinates with prescribed values, ascending
     """
@@ -91,8 +89,6 @@ PROBES = 200
 class ReducedSpace(Space):
     """Forces, boundary conditions, contacts and system matrix in coordinates z (K, 3), q = B z.
 
-    Parameters
-    ----------
     matrices : stiffness B^T S^T W S B (K, K) of each group, summed over all or sampled elements
 
     Attributes

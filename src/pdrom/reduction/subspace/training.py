@@ -24,8 +24,6 @@ def make_columns(
 ) -> spaces.Columns:
     """Columns of a position subspace for all of ``scenes``; fewer if there are not so many modes.
 
-    Parameters
-    ----------
     scenes : training scenes, on one mesh; what one of them holds has columns of its own
     training : (n, N, 3) m, positions in the training frames
     pod, skinning : numbers of POD modes of the training frames, and of skinning modes
