@@ -56,9 +56,9 @@ class BasisSpec(ConfigModel):
 class MethodSpec(BasisSpec):
     """A method that reduces the projections of one constraint group.
 
-    rows : "all" samples nothing (orthogonal projection), "scalar" samples single entries (classical
-        DEIM), "joint" samples rows, with separate coefficients for x, y and z (the preprint's
-        variant), "element" samples all 3p entries of an element of p rows
+    rows : "all" (orthogonal projection), "scalar" samples single entries (classical DEIM), "joint"
+        rows, with separate coefficients for x, y and z (the preprint's variant), "element" all 3p
+        entries of an element of p rows
     selection : name in `SELECTIONS`, such as "greedy" (largest residual, as in DEIM)
     solve : solution of the sampled equations: "square", least squares by "qr", or normal equations
         with Tikhonov term ("tikhonov", as in the program published with the preprint)
@@ -90,34 +90,29 @@ class MethodSpec(BasisSpec):
 
     @model_validator(mode="after")
     def _combination_exists(self) -> Self:
+        rows, square = f"rows = '{self.rows}'", self.solve == "square"
+        solved, basis = f"solve = '{self.solve}'", f"{self.layout}, {self.centring}"
         if self.rows == "joint" and self.selection != "greedy":
-            raise ValueError(f"rows = 'joint' with selection = '{self.selection}': only 'greedy'")
-        if self.rows == "element" and self.solve == "square":
-            raise ValueError("rows = 'element' with solve = 'square': allowed are qr, tikhonov")
-        joint = self.rows == "joint" and self.solve != "square"
-        if self.oversampling > 1 and not (self.may_oversample or joint):
+            raise ValueError(f"{rows} with selection = '{self.selection}': only 'greedy'")
+        if square and (self.rows == "element" or self.repeat_rows):
+            fault = "repeat_rows" if self.repeat_rows else rows
+            raise ValueError(f"{fault} with {solved}: allowed are qr, tikhonov")
+        if self.oversampling > 1 and (square or self.rows == "all"):
             raise ValueError(
-                f"oversampling = {self.oversampling} with rows = '{self.rows}', solve = "
-                f"'{self.solve}': only rows = 'scalar', 'joint', 'element' with solve = 'qr', "
-                "'tikhonov'"
+                f"oversampling = {self.oversampling} with {rows}, {solved}: only rows = 'scalar', "
+                "'joint', 'element' with solve = 'qr', 'tikhonov'"
             )
-        if self.gain_bound is not None and (not self.may_oversample or self.per_axis):
+        if self.gain_bound and (square or self.per_axis or self.rows in ("all", "joint")):
             raise ValueError(
-                f"gain_bound = {self.gain_bound} with rows = '{self.rows}', solve = "
-                f"'{self.solve}': only rows = 'scalar' or 'element' with solve = 'qr', "
-                "'tikhonov' and coefficients that the axes share"
+                f"gain_bound = {self.gain_bound} with {rows}, {solved}: only rows = 'scalar' or "
+                "'element' with solve = 'qr', 'tikhonov' and coefficients that the axes share"
             )
         if self.separate_axes and self.coefficients == "shared":
-            raise ValueError(
-                f"coefficients = 'shared' with {self.layout}, {self.centring}: only 'per-axis'"
-            )
+            raise ValueError(f"coefficients = 'shared' with {basis}: only 'per-axis'")
         if self.per_axis and self.rows == "scalar":
             raise ValueError(
-                f"rows = 'scalar' with {self.layout}, {self.centring}: separate coefficients per "
-                "axis need rows = 'all', 'joint' or 'element'"
+                f"{rows} with {basis}: coefficients per axis need rows = 'all', 'joint', 'element'"
             )
-        if self.repeat_rows and self.solve == "square":
-            raise ValueError("repeat_rows with solve = 'square': a repeated row is singular")
         return self
 
     @property
@@ -125,11 +120,6 @@ class MethodSpec(BasisSpec):
         """Import paths "module:attribute" of the selection rules on whose code samples depend."""
         selects = self.rows in ("scalar", "element") or self.oversampling > 1
         return [SELECTIONS[self.selection]] if selects else []
-
-    @property
-    def may_oversample(self) -> bool:
-        """Whether more samples than modes are allowed, to bound the amplification of errors."""
-        return self.rows in ("scalar", "element") and self.solve != "square"
 
     @property
     def per_axis(self) -> bool:

@@ -1,9 +1,8 @@
 """Timing of step loops ("variants"), alternately, after a warm-up.
 
-A variant is a step loop with its initial state. Each repeat runs every variant once from its
-initial state, so that changes of the processor's clock rate affect all variants alike. For each
-frame, the time of the median repeat is used: an interruption by another program affects one frame
-of one repeat only.
+Each repeat runs every variant once from its initial state, so that changes of the processor's clock
+rate affect all variants alike. For each frame, the time of the median repeat is used: an
+interruption by another program affects one frame of one repeat only.
 """
 
 import logging
@@ -64,9 +63,8 @@ def model_variant(labels: dict[str, Any], scene: Scene, model: Reduced, frames: 
 def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict[str, Any]]:
     """Time all variants; return a row for each: labels, and times of the `PHASES` in ms.
 
-    Times are means over the frames; those of a frame are from the repeat with the median total time
-    of the frame. Of each variant there are ``warmup`` unmeasured runs, the first of which also
-    factorises and caches matrices, and ``repeats`` measured runs.
+    Times are means over the frames (`median_frames`). Of each variant there are ``warmup``
+    unmeasured runs, the first of which also factorises matrices, and ``repeats`` measured runs.
     """
     samples: list[list[np.ndarray]] = [[] for _ in variants]
     for repeat in range(-warmup, repeats):

@@ -6,11 +6,9 @@ In the K' coordinates z of a position subspace that are not fixed, one iteration
     p = p(d)             projections
     z = c + L^T p        global step, with c = A^-1 (M/h^2 s - load) and L = W D A^-1
 
-D and L are (m p, K') for p rows per element, load is due to the fixed coordinates. An iteration has
-two small dense products and the projections; it allocates nothing, and no array grows with the
-mesh. If no group has data that are computed once per frame, c is the product of a matrix with s,
-whose fixed coordinates are set to their targets, and one compiled call computes many frames, up to
-the first in which a vertex is below a floor.
+D and L are (m p, K') for p rows per element, load is due to the fixed coordinates. No array grows
+with the mesh. If no group has data that are computed once per frame, one compiled call computes
+many frames, up to the first in which a vertex is below a floor.
 """
 
 from collections.abc import Sequence
@@ -127,8 +125,8 @@ class _Fused:
     ) -> Blocks | None:  # fmt: skip
         """Compute as many of ``frames`` in turn as one compiled call can; ``track`` is ignored.
 
-        Return None if the body touches a floor in the first frame, and also in the next `BLOCK` - 1
-        calls, as contacts last. In both cases, the caller computes one frame by `iterate`.
+        Return None if the body touches a floor in the first frame, and in the next `BLOCK` - 1
+        calls, as contacts last: the caller then computes one frame by `iterate`.
         """
         if self._waiting and frames.start:
             self._waiting -= 1
@@ -262,7 +260,6 @@ def run_frames(
 
     positions, velocities : (F + 1, K, 3) coordinates, the first ones given, the others written
     acceleration, rate, rates : a, c, C of the acceleration a + c v + C v by all forces
-    h : time step, s
     fixed, free : (m,), (K',) indices of the fixed coordinates and of the free ones
     targets : (F, m, 3) values of the fixed coordinates in each frame
     begun : matrices for the start of a frame, see `_Operators`

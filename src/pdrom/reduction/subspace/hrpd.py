@@ -76,10 +76,9 @@ class SampledSpace:
 def sampled_space(
     group: ConstraintGroup, points: np.ndarray, spec: HrpdSpec
 ) -> SampledSpace | None:
-    """Space of projections of ``group``, with samples; None if rest vectors are only round-off.
+    """Space of projections of ``group``; None if rest vectors S ``points`` are only round-off.
 
-    Rest vectors are S ``points``: operators S of all elements times rest positions (N, 3) m. Raises
-    SamplingError if sampled elements do not determine the coefficients of projections in the space.
+    ``points`` (N, 3) m is the rest shape. SamplingError if the samples do not determine the space.
     """
     rest = group.S @ points
     if np.linalg.norm(rest) <= group.roundoff(points):
@@ -96,8 +95,8 @@ def projection_space(
 ) -> np.ndarray:
     """W-orthonormal columns (e p, d) of the span of skinning weights times rest vectors.
 
-    The rest vectors come first, so that the rest shape and its rotations are exact. They are
-    followed by the leading POD modes of the products, without their part along the rest vectors.
+    The rest vectors come first, so that the rest shape and its rotations are exact. POD modes of
+    the products, without their part along the rest vectors, follow.
 
     ``rest`` (e p, 3) are the rest vectors, ``centres`` (e, 3) m those of the elements, ``weights``
     (e p,) the diagonal of W; ``dimension`` is the largest number d of columns.

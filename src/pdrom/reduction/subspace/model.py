@@ -101,8 +101,8 @@ PANEL, TERMS = 512, 4
 class Output:
     """Function of coordinates z (K, 3) that returns positions B z (N, 3) m in a ``kind`` of floats.
 
-    The matrix ``B`` (N, K) is stored in panels of `PANEL` rows, so that memory is read once and in
-    order, and `TERMS` of its columns are added at a time. Each call overwrites the last result.
+    ``B`` (N, K) is stored in panels of `PANEL` rows, and `TERMS` of its columns are added at a
+    time, so that memory is read in order. Each call overwrites the last result.
     """
 
     def __init__(self, B: np.ndarray, kind: Any = np.float32) -> None:

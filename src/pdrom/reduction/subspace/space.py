@@ -1,8 +1,7 @@
 """The step loop in the coordinates of a position subspace, q = B z.
 
-Arrays with an entry per vertex are used only before the run. During a run, arrays have an entry per
-subspace coordinate, per vertex fixed by a boundary condition, or (in scenes with contacts) per
-"probe": one of at most `PROBES` vertices at which contacts are detected.
+During a run, arrays have an entry per subspace coordinate, per vertex fixed by a boundary condition
+or (in scenes with contacts) per "probe": a vertex at which contacts are detected.
 """
 
 from collections.abc import Sequence
@@ -24,8 +23,7 @@ from pdrom.reduction.subspace.columns import Columns
 class DenseElimination:
     """Reduced system without the fixed coordinates, solved by its explicit (small) inverse.
 
-    Raises SolverError if the block of the free coordinates is not positive definite or is solved
-    inaccurately.
+    SolverError if its matrix is not positive definite or is solved inaccurately.
 
     matrix : (K, K) matrix of the reduced system, kg/s^2
     fixed : (m,) indices of the coordinates with prescribed values, ascending
@@ -60,8 +58,8 @@ class DenseElimination:
     def response(self, inertia: np.ndarray) -> np.ndarray:
         """Matrix (K', K) that maps a prediction s (K, 3) to the K' coordinates not fixed.
 
-        These solve the reduced system for the right-hand side ``inertia`` s; ``inertia`` (K, K) is
-        B^T M B / h^2. Entries of s for fixed coordinates must be the values fixed by `set_targets`.
+        These solve the system for ``inertia`` s, with ``inertia`` B^T M B / h^2 (K, K). Fixed
+        entries of s must be those of `set_targets`.
         """
         result = self._inverse @ inertia[self.free]
         result[:, self.fixed] -= self._inverse @ self._coupling
@@ -170,8 +168,7 @@ def projector(columns: Columns, masses: np.ndarray) -> np.ndarray:
 def _mass_solve(columns: Columns, masses: np.ndarray, rhs: np.ndarray) -> np.ndarray:
     """Return (B^T M B)^-1 ``rhs`` with the matrix B of ``columns``.
 
-    B^T M B is scaled to a unit diagonal: masses far from 1 kg would make it ill-conditioned, since
-    columns of vertices with boundary conditions are orthonormal, but not mass-orthonormal.
+    B^T M B is scaled to a unit diagonal, as masses far from 1 kg would make it ill-conditioned.
     """
     mass = columns.B.T @ (masses[:, None] * columns.B)
     scale = 1.0 / np.sqrt(np.diag(mass))[:, None]
@@ -186,10 +183,10 @@ def reduced_state(scene: Scene, columns: Columns, state: State | None = None) ->
 
 
 def _reduce_force(force: base.Force, columns: Columns, scene: Scene) -> tuple[np.ndarray, Any]:
-    """Project ``force`` on the subspace: return constant (K, 3) and rate of its acceleration.
+    """Return constant (K, 3) and rate of the acceleration constant + rate v at velocity v.
 
-    The acceleration must be constant + rate v with velocity v. The rate is a number, or a matrix
-    (K, K) if vertices have different rates. NotReducibleError is raised for all other forces.
+    The rate is a number, or a matrix (K, K) if vertices have different rates. NotReducibleError is
+    raised for all other forces.
     """
     shape = scene.mesh.points.shape
     rng = np.random.default_rng(0)

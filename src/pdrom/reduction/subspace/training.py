@@ -58,10 +58,9 @@ def sampled_models(
 ) -> list[SubspaceModel]:
     """Models in ``columns`` with energy-conserving samples of every group, one per tolerance.
 
-    Training data are iterates of runs of ``scenes`` in the subspace, with all elements projected.
-    Of each run, equally many of its ``frames`` are used, about `FRAMES` in total. The first begins
-    at ``start``, in subspace coordinates, or (if None) at its initial state. ``choose`` selects
-    elements instead of non-negative least squares.
+    Training data are iterates of runs of ``scenes`` in the subspace, in equal shares of ``frames``.
+    The first run begins at ``start``, in subspace coordinates, or (if None) at its initial state.
+    ``choose`` selects elements instead of non-negative least squares.
     """
     count, training = -(-FRAMES // len(scenes)), []
     for i, scene in enumerate(scenes):

@@ -117,23 +117,6 @@ def test_mean_in_modes_spans_another_space_with_other_signs():
         np.testing.assert_array_equal(basis_of(p, spec).V, other.V)
 
 
-def test_mean_in_modes_has_no_more_modes_than_rows(rng):
-    p = rng.standard_normal((30, 6, 3))
-    assert basis_of(p, BasisSpec()).rank == 18
-    assert basis_of(p, BasisSpec(centring="mean-in-modes")).rank == 6
-
-
-@every_spec
-def test_zero_and_round_off_have_no_basis(spec, rng):
-    """Data of size 1e-14 are a full-rank matrix; only their round-off tells that they are noise."""
-    basis = basis_of(np.zeros((5, ROWS, 3)), spec)
-    assert basis.rank == 0
-    assert basis.V.shape == (3 * ROWS, 0)
-    assert basis.active_axes == (False, False, False)
-    p = 1e-14 * rng.standard_normal((7, ROWS, 3))
-    assert basis_of(p, spec, roundoff=1e-12).rank == 0
-
-
 @every_spec
 def test_tiny_and_huge_snapshots_have_the_basis_of_ordinary_ones(spec):
     """Squares of their entries underflow or overflow; a power of two changes no digit."""

@@ -11,7 +11,7 @@ from builders import TOP, Pushing, make_scene
 from pdrom.model.runs import trajectory
 from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.method import MethodSpec, load_methods
-from pdrom.reduction.rerun import displacement_norms, rerun, step_norms
+from pdrom.reduction.rerun import displacement_norms, rerun
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.local_step import ReducedLocalStep, replace_group
 from places import CONFIG
@@ -241,18 +241,3 @@ def test_numbers_that_are_none_end_the_run_before_them(bad):
     assert np.isfinite(result.positions).all()
     assert result.frames <= 1
     assert np.isfinite(result.max_extent)
-
-
-def test_steps_are_those_of_the_velocities():
-    """What a vertex moves in a frame is the time step times the velocity that the loop has then."""
-    scene = scene_with("spring", "strain")
-    loop, state = scene.stepper(scene.system, scene.groups), scene.initial_state()
-    positions, speeds = [state.positions], []
-    for frame in range(scene.config.frames):
-        state, _ = loop.step(state, frame)
-        positions.append(state.positions)
-        speeds.append(np.linalg.norm(state.velocities))
-    expected = scene.config.time_step * np.array(speeds)
-    assert (expected > 0.0).all()
-    np.testing.assert_allclose(step_norms(np.stack(positions)), expected, rtol=1e-12)
-    assert len(step_norms(np.zeros((1, 2, 3)))) == 0

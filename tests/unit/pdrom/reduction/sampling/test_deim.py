@@ -105,17 +105,6 @@ def test_greedy_follows_its_definition(size):
     np.testing.assert_equal((v, w), before)
 
 
-@pytest.mark.parametrize("repeat", [False, True])
-def test_singular_axis_system_raises_nothing_and_is_deterministic(repeat):
-    """The z part of every mode is zero although the axis counts: a 0 x 0 information system."""
-    v = blocks((30, 3, 8, 2))
-    v[2::3] = 0.0
-    rows = joint_rows(v, ALL, repeat)
-    assert len(rows) == 8
-    assert ((rows >= 0) & (rows < 30)).all()
-    np.testing.assert_array_equal(joint_rows(v, ALL, repeat), rows)
-
-
 def test_rows_repeat_only_where_allowed():
     """Equal second mode: its residual vanishes, so that the largest is the first row again."""
     v = np.repeat(blocks((10, 3, 1, 3)), 3, axis=1)
@@ -179,17 +168,6 @@ def test_qdeim_of_dependent_modes_takes_distinct_elements(size):
     assert len(set(elements.tolist())) == v.shape[1] + 3
     assert np.linalg.matrix_rank(sampled(v, elements, size)) == v.shape[1]
     assert qdeim_elements(np.zeros((12, 3)), size).tolist() == [0, 1, 2]
-
-
-@pytest.mark.parametrize("algorithm", [block_elements, qdeim_elements])
-def test_modes_that_live_on_few_elements_do_not_stop_the_selection(algorithm, rng):
-    """Two elements hold all three modes; the third pick finds nothing but must be another one."""
-    v = np.zeros((15, 3))
-    v[3:9] = np.linalg.qr(rng.standard_normal((6, 3)))[0]
-    elements = algorithm(v, 3)
-    assert len(set(elements.tolist())) == 3
-    assert {1, 2} <= set(elements.tolist())
-    assert np.linalg.matrix_rank(sampled(v, elements, 3)) == 3
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -79,17 +79,3 @@ def test_a_basis_holds_what_the_data_hold_and_reports_its_gain(name, method, rng
         with pytest.raises(RankError, match=f"r = {r}, .* numerical rank {basis.rank}"):
             select(basis, spec, r)
     assert basis_of(p, method, roundoff=2.0 * np.linalg.norm(p) + 1e-300).rank == 0
-
-
-@pytest.mark.parametrize("method", ["block-deim", "block-qdeim"])
-def test_a_twin_element_is_not_taken_for_a_second_mode(method, rng):
-    """Two identical elements carry one piece of information: both would leave a mode open."""
-    p = np.zeros((FRAMES, ELEMENTS * ROWS, 3))
-    first, second = rng.standard_normal((2, FRAMES))
-    p[:, : 2 * ROWS] = first[:, None, None]
-    p[:, 6 * ROWS : 7 * ROWS] = 0.1 * second[:, None, None]
-    basis = basis_of(p, method)
-    assert basis.rank == 2
-    chosen = select(basis, METHODS[method], 2)
-    assert 6 in chosen.elements
-    assert Reduction(basis, chosen, METHODS[method], 2).gain < 10.0

@@ -109,46 +109,6 @@ def test_gain_is_the_norm_of_the_pseudo_inverse_and_bounds_the_error(name, seed)
     assert (np.linalg.norm(error, axis=(1, 2)) <= bound * (1.0 + 1e-10)).all()
 
 
-@given(seed=SEEDS)
-@pytest.mark.parametrize("rows", ["scalar", "element"])
-def test_error_with_mass_weighting_has_its_factor_in_the_mass_norm(rows, seed):
-    """|| (P^T V)^+ P^T M^(-1/2) ||_2 takes the place of the gain, see `Reduction.gain`."""
-    spec = MethodSpec(title="t", weighting="mass", centring="affine", rows=rows, solve="qr")
-    p, mass = data(seed)
-    reduction = reduction_of(p, mass, spec, 5)
-    block, weight = reduction.blocks[0], np.repeat(mass, 3)
-    factor = np.linalg.norm(block.operator / np.sqrt(weight[block.entries]), 2)
-    unseen = np.random.default_rng(seed + 1).standard_normal(p.shape)
-    centred = unseen.reshape(8, -1) - reduction.basis.mean
-    best = centred - (centred * weight) @ reduction.v @ reduction.v.T
-    error = (unseen - reduction.reconstruct(unseen)).reshape(8, -1)
-    norms = [np.linalg.norm(e * np.sqrt(weight), axis=1) for e in (error, best)]
-    assert (norms[0] <= factor * norms[1] * (1.0 + 1e-10)).all()
-
-
-@pytest.mark.parametrize("preset", ["deim", "qdeim", "deim-joint"])
-def test_square_methods_interpolate_the_sampled_entries(preset):
-    spec = PRESETS[preset]
-    p, reduction = made(spec, 5, 6)
-    unseen = np.random.default_rng(6).standard_normal(p.shape)
-    flat, result = unseen.reshape(8, -1), reduction.reconstruct(unseen).reshape(8, -1)
-    sampled = np.concatenate([b.entries for b in reduction.blocks])
-    assert len(sampled) == (18 if spec.rows == "joint" else 6)
-    np.testing.assert_allclose(result[:, sampled], flat[:, sampled], atol=1e-11 * reduction.gain)
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-def test_only_sampled_elements_are_read(preset):
-    p, reduction = made(PRESETS[preset], 9, 4)
-    unsampled = np.setdiff1d(np.arange(ELEMENTS), reduction.elements)
-    assert (len(unsampled) == 0) == (preset == "pod")
-    other = p.reshape(8, ELEMENTS, P, 3).copy()
-    other[:, unsampled] = np.nan
-    np.testing.assert_array_equal(
-        reduction.reconstruct(other.reshape(p.shape)), reduction.reconstruct(p)
-    )
-
-
 def test_selections_and_numbers_of_rows_and_elements_are_those_of_the_presets():
     """Each algorithm is reached: no two methods pick the same entries."""
     by_name = {name: made(spec, 21, 7)[1] for name, spec in PRESETS.items()}
@@ -194,17 +154,6 @@ def test_singular_axis_is_a_failure_that_raises_nothing():
     assert np.isfinite(result[:, :, :2]).all()
 
 
-def test_poorer_axis_of_a_basis_per_axis_fails_beyond_its_rank_only():
-    rng = np.random.default_rng(3)
-    p, mass = data(15)
-    p[:, :, 2] = rng.standard_normal((8, 2)) @ rng.standard_normal((2, ROWS))
-    joint = MethodSpec(title="t", layout="per-axis", rows="joint", solve="qr")
-    assert np.isfinite(reduction_of(p, mass, joint, 2).gain)
-    assert reduction_of(p, mass, joint, 5).gain == np.inf
-    full = reduction_of(p, mass, MethodSpec(title="t", layout="per-axis", rows="all"), 8)
-    np.testing.assert_allclose(full.reconstruct(p), p, atol=1e-11)
-
-
 @given(name=st.sampled_from(list(EVERY)))
 def test_path_holds_the_selection_of_every_rank(name):
     spec = EVERY[name]
@@ -218,13 +167,6 @@ def test_path_holds_the_selection_of_every_rank(name):
     for ranks in ([0, 3], [3, 9], [-1]):
         with pytest.raises(RankError, match=f"allowed are 1 to {basis.rank}"):
             select_path(basis, spec, ranks)
-
-
-def test_more_modes_than_rows_end_in_an_infinite_gain():
-    p = np.random.default_rng(23).standard_normal((30, 6, 3))
-    reduction = reduction_of(p, np.ones(6), PRESETS["deim-joint"], 9)
-    assert reduction.gain == np.inf
-    assert len(reduction.elements) == 3
 
 
 @pytest.mark.parametrize("preset", PRESETS)

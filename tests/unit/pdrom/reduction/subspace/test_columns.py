@@ -116,25 +116,6 @@ def test_displacement_modes_are_the_mass_weighted_pod_and_no_more_than_the_data_
         assert spaces.displacement_modes(few, points, masses, 9).shape[1] == rank
 
 
-def test_atoms_get_modes_for_what_they_do_when_released(moved):
-    """The bottom row is let go in frame 8 and bends: its motion is in its columns."""
-    scene, run = moved
-    columns = make_columns([scene], run[1:], 8)
-    straight = spaces.build_columns(
-        spaces.displacement_modes(run[1:], scene.mesh.points, scene.masses, 8),
-        scene.mesh.points, scene.masses, columns.atoms, run[1:8],
-    )  # fmt: skip
-    for atom, own, few in zip(
-        columns.atoms, columns.atom_columns, straight.atom_columns, strict=True
-    ):
-        block = columns.B[np.ix_(atom, own)]
-        motion = run[-1][atom]
-        left = motion - block @ (block.T @ motion)
-        assert np.linalg.norm(left) < 2e-3 * np.linalg.norm(run[-1] - run[0])
-        assert len(few) == 2
-    assert max(len(own) for own in columns.atom_columns) > 2
-
-
 @pytest.mark.parametrize("handles", [1, 2, 5, 12, 30])
 def test_skinning_weights_are_a_partition_of_unity(handles):
     points = make_scene(SPRING).mesh.points

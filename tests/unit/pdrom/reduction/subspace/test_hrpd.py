@@ -13,6 +13,7 @@ from pdrom.reduction.basis import compute_basis
 from pdrom.reduction.deviations import Yardstick
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import Reduction, select
+from pdrom.reduction.sampling.reduction import element_rows
 from pdrom.reduction.subspace import hrpd
 from pdrom.reduction.subspace.columns import skinning_weights
 from pdrom.reduction.subspace.interpolation import (
@@ -43,7 +44,7 @@ def test_space_is_orthonormal_starts_with_the_rest_vectors_and_fits_by_least_squ
     rest = group.S @ points
     first = V[:, :3] @ (V[:, :3].T @ (group.row_weights[:, None] * rest))
     np.testing.assert_allclose(first, rest, atol=1e-10 * np.abs(rest).max())
-    rows = sampled_rows(group, space)
+    rows = element_rows(space.elements, group.rows_per_element)
     values = rng.standard_normal((len(rows), 3))
     weighted = group.row_weights[rows, None] * V[rows]
     left = values - V[rows] @ (space.operator @ values)
@@ -51,12 +52,6 @@ def test_space_is_orthonormal_starts_with_the_rest_vectors_and_fits_by_least_squ
     words = f"'{group.name}': 2 samples .* allowed are more samples or a smaller dimension"
     with pytest.raises(SamplingError, match=words):
         hrpd.sampled_space(group, points, hrpd.HrpdSpec(dimension=12, samples=2))
-
-
-def sampled_rows(group, space) -> np.ndarray:
-    """Rows of the operator that belong to the samples of a space."""
-    p = group.rows_per_element
-    return (space.elements[:, None] * p + np.arange(p)).ravel()
 
 
 @pytest.mark.parametrize("name", sorted(GROUPS))
@@ -75,29 +70,9 @@ def test_blended_linear_maps_are_reproduced_exactly(name, seed, handles):
     spec = hrpd.HrpdSpec(dimension=active * handles, samples=20)
     space = hrpd.sampled_space(group, points, spec)
     assert len(space.elements) < group.elements or group.elements <= 20
-    again = space.V @ (space.operator @ field[sampled_rows(group, space)])
+    rows = element_rows(space.elements, group.rows_per_element)
+    again = space.V @ (space.operator @ field[rows])
     np.testing.assert_allclose(again, field, atol=1e-7 * np.abs(field).max())
-
-
-def test_samples_spread_over_the_mesh():
-    """Farthest points: with twice as many, none is farther from a sample than before."""
-    scene = make_scene({"effect": "strain", "weight": 1.0})
-    group, points = scene.groups[0], scene.mesh.points
-    centres = hrpd.element_centres(group, points)
-
-    def radius(samples: int) -> float:
-        chosen = hrpd.sampled_space(
-            group, points, hrpd.HrpdSpec(dimension=2, samples=samples)
-        ).elements
-        return float(np.linalg.norm(centres[:, None] - centres[chosen], axis=2).min(axis=1).max())
-
-    assert radius(20) < 0.7 * radius(5)
-    assert radius(10_000) == 0.0
-
-
-def test_a_group_without_rest_vectors_has_no_space():
-    scene = make_scene({"effect": "bending", "weight": 1.0})
-    assert hrpd.sampled_space(scene.groups[0], scene.mesh.points, hrpd.HrpdSpec()) is None
 
 
 def test_hrpd_is_exact_with_everything_and_for_a_turned_rest_shape(group_scene, rng):

@@ -12,8 +12,8 @@ from pdrom.core.store import write_hdf5
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.runs import trajectory
 from pdrom.reduction.deviations import Yardstick
-from pdrom.reduction.subspace import interpolation, training
 from pdrom.reduction.subspace import model as models
+from pdrom.reduction.subspace import training
 from pdrom.reduction.subspace.columns import atoms, build_columns
 from pdrom.reduction.subspace.fused import FusedStepper
 from pdrom.reduction.subspace.hrpd import HrpdSpec, hrpd, sampled_space
@@ -173,28 +173,6 @@ def test_a_step_reads_nothing_of_the_mesh(name, made):
         group.S.data[...] = np.nan
         group.weights[...] = np.nan
     np.testing.assert_array_equal(run(), before)
-
-
-def test_arrays_of_a_step_have_the_size_of_the_sample():
-    """The same sampled elements on meshes of two sizes: nothing grows with the mesh."""
-    sizes = []
-    for rows in (32, 64):
-        scene = make_scene(SPRING, TOP, mesh={"kind": "cloth", "rows": rows, "columns": 8})
-        columns = training.make_columns([scene], trajectory(scene)[1:], skinning=4)
-        group, few, k = scene.groups[0], np.array([3, 11]), columns.B.shape[1]
-        fit = interpolation.Interpolation(
-            few, np.ones((1, 2)), np.ones((k, 1)), np.zeros((k, 3)), np.eye(k), gain=1.0
-        )
-        steps = (
-            interpolation.SubspaceLocalStep(group, columns, few, np.ones(2)),
-            interpolation.InterpolatedLocalStep(group, columns, fit),
-        )
-        parts = [part for step in steps for part in (step, step.group)]
-        held = [[v for v in vars(x).values() if isinstance(v, np.ndarray)] for x in parts]
-        assert min(map(len, held)) > 0
-        shapes = [sorted(array.shape for array in arrays) for arrays in held]
-        sizes.append((shapes, [step.group.S.shape for step in steps]))
-    assert sizes[0] == sizes[1]
 
 
 @pytest.mark.parametrize(
