@@ -191,13 +191,10 @@ def group_basis(
 def _check(
     snapshots: np.ndarray, row_mass: np.ndarray, rows_per_element: int, spec: BasisSpec
 ) -> None:
-    if snapshots.ndim != 3 or snapshots.shape[2] != 3 or len(snapshots) < 2:
-        required = "(n >= 2, e p, 3); a run of one or two frames has one snapshot"
+    n, rows, axes = snapshots.shape if snapshots.ndim == 3 else (0, 0, 0)
+    if n < 2 or axes != 3 or rows == 0 or rows % rows_per_element:
+        required = f"(n >= 2, e p, 3), p = {rows_per_element}; one or two frames have one snapshot"
         raise SnapshotError(f"snapshots of shape {snapshots.shape}, required: {required}")
-    rows = snapshots.shape[1]
-    if rows == 0 or rows % rows_per_element:
-        required = f"a multiple of rows_per_element = {rows_per_element}"
-        raise SnapshotError(f"snapshots of {rows} rows, required: {required}")
     if row_mass.shape != (rows,):
         raise SnapshotError(f"row_mass of shape {row_mass.shape}, required: ({rows},)")
     require_finite("snapshots", snapshots, SnapshotError)

@@ -77,9 +77,9 @@ class Yardstick:
     def series(self) -> dict[str, np.ndarray]:
         """Per-frame series of the full-order run for the argument ``reference`` of `errors_within`.
 
-        ``displacement`` and ``deformed`` (F,) m; ``step`` (F,) m, norm of time step times
-        velocities; ``energy`` in every `STRIDE`-th frame and the last, scaled by `scale`;
-        `CONVERGED`: the first two of the converged run, empty without it.
+        ``displacement``, ``deformed`` (F,) m; ``step`` (F,) m, see `step_norms`; ``energy`` in
+        every `STRIDE`-th frame and the last, scaled by `scale`; `CONVERGED`: the first two of the
+        converged run, empty without it.
         """
         limit = self.converged
         others = [np.zeros(0)] * 2 if limit is None else [limit.displacement, limit.deformed]
@@ -151,10 +151,9 @@ class Yardstick:
         """Deviations in each of the F' frames of the run ``outcome`` from the full-order run.
 
         ``difference``, ``shape_difference`` (without rigid motion), ``step_difference`` (of changes
-        of the positions in a frame): (F',) m, norms of the differences of both runs. ``energy`` is
-        of ``outcome`` alone: every `STRIDE`-th frame and its last, scaled by `scale` (empty if the
-        full order's is round-off). The first two are also given from the converged run (empty
-        without it).
+        of the positions in a frame): (F',) m, norms of the differences of both runs, the first two
+        also from the converged run (empty without it). ``energy`` is of ``outcome`` alone: every
+        `STRIDE`-th frame and its last, scaled by `scale`.
         """
         limit = self.converged
         with np.errstate(over="ignore", invalid="ignore"):
@@ -176,10 +175,8 @@ def errors_within(
 ) -> dict[str, float | None]:
     """Return a mapping of column names to the errors over the frames before number ``end``.
 
-    An error is None if the run ended earlier or the full-order run lacks the quantity.
-
-    run, reference : per-frame series from `Yardstick.deviations` and `Yardstick.series`
-    extent_norm, rest_norm : as `Yardstick.units`
+    An error is None if the run ended earlier or the full-order run lacks the quantity. ``run``
+    comes from `Yardstick.deviations`, ``reference`` from `Yardstick.series`, norms from `units`.
     """
     if len(run["difference"]) < end:
         return dict.fromkeys(ERRORS)
@@ -213,8 +210,7 @@ def errors_within(
 def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> float | None:
     """Relative error over the first ``end`` frames; None if the run has fewer or nothing moved.
 
-    difference : (F',) m, norms of the difference between the run and the full-order run
-    displacement : (F,) m, norms of the displacement of the full-order run
+    ``difference`` (F',) and ``displacement`` (F,) are norms as `metrics.trajectory_error` takes.
     """
     if len(difference) < end:
         return None

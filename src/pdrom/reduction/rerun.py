@@ -89,8 +89,7 @@ def displacement_norms(reference: np.ndarray) -> np.ndarray:
 def step_norms(positions: np.ndarray) -> np.ndarray:
     """Norms (F,) m of the steps between successive frames of ``positions`` (F + 1, N, 3) m.
 
-    A step is the velocity times the time step h. Given the difference of the positions of two
-    runs, the result is h times the norm of the difference of their velocities.
+    They are the time step times norms of velocities; of differences, given those of two runs.
     """
     return np.linalg.norm(np.diff(positions, axis=0), axis=(1, 2))
 

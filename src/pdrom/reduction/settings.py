@@ -6,6 +6,7 @@ coarser mesh, or a reduced model.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -49,8 +50,7 @@ class Setting:
     def run(self, frames: int, extent: float) -> np.ndarray | None:
         """Run it; return positions (F + 1, N, 3) m at the start and at the ends of F frames.
 
-        None if the run is not finite, or if a side of its bounding box exceeds `BLOWUP_EXTENT`
-        times the ``extent`` (m).
+        None if the run blew up: a side of its bounding box exceeds `BLOWUP_EXTENT` ``extent`` (m).
         """
         steps, limit = frames * self.steps, BLOWUP_EXTENT
         run = BoundedRun(self.loop.run, self.start, steps, limit, extent, self.positions)
@@ -71,10 +71,8 @@ class Setting:
     def variant(
         self, labels: dict[str, Any], frames: int, starts: Starts = (), warm: int | None = None
     ) -> Variant:
-        """Return it to be timed over ``frames`` frames, or over one from each state of ``starts``.
-
-        starts : pairs (state of all vertices, number of the next frame)
-        warm : number of frames of an unmeasured run; None for ``frames``
+        """Return it to be timed over ``frames`` frames, or over one from each of ``starts``: pairs
+        (state of all vertices, number of the next frame). An unmeasured run has ``warm`` frames.
         """
         own, steps = tuple((self.state(s), self.steps * n) for s, n in starts), self.steps
         warm = None if warm is None else warm * steps
@@ -91,14 +89,12 @@ def full_order(
 
     counts : pairs (iterations of a frame, window of Anderson acceleration or 0)
     """
-    counts = list(counts)
-    for mesh in meshes:
+    for mesh, (count, window) in product(meshes, counts):
         own = scene if mesh is None else mesh.scene
-        for count, window in counts:
-            names = (PLAIN, ANDERSON) if mesh is None else (COARSER, COARSER_ANDERSON)
-            method = names[window > 0]
-            labels = {"method": method, "iterations": count, "vertices": own.mesh.vertices}
-            yield loop_of(labels, own.iterated(count, window), mesh)
+        names = (PLAIN, ANDERSON) if mesh is None else (COARSER, COARSER_ANDERSON)
+        method = names[window > 0]
+        labels = {"method": method, "iterations": count, "vertices": own.mesh.vertices}
+        yield loop_of(labels, own.iterated(count, window), mesh)
 
 
 def loop_of(

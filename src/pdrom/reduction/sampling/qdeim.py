@@ -34,10 +34,9 @@ def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
 class _Left:
     """Groups of columns of V^T, one per element; directions of earlier pivots are projected out.
 
-    Their norms only decrease, so that old norms are upper bounds. The norms of the groups with the
-    largest bounds are computed. The group with the largest of these is the next pivot if its norm
-    exceeds the bounds of all other groups; otherwise the bounds of all groups are updated. V is
-    thus read a few times, while LAPACK reads it once per pivot.
+    Their norms only decrease, so that old norms are upper bounds. Of the groups with the largest
+    bounds, the one with the largest norm is the next pivot if it exceeds the bounds of all others;
+    otherwise all bounds are updated. V is thus read a few times, not once per pivot.
     """
 
     def __init__(self, v: np.ndarray, size: int) -> None:

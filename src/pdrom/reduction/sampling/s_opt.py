@@ -15,8 +15,7 @@ from pdrom.core.errors import SamplingError
 from pdrom.reduction.sampling.deim import GrowingFit, Selection
 
 # A unit column counts as dependent on others if its part orthogonal to them has a norm below this.
-# For a copy of a column, round-off gives up to 1e-15 sqrt(r). A part below 1e-10 would be useless
-# as well, since it would amplify errors of samples by 1e10.
+# For a copy of a column, round-off gives up to 1e-15 sqrt(r).
 DEPENDENT = 1e-12
 
 
@@ -66,8 +65,7 @@ class _Sampled:
     sampled, M of each element becomes M - X (I + D G^-1 D^T)^-1 X^T, X = B G^-1 D^T (Woodbury). A
     new mode is fitted by the k modes at the sampled rows: z (s,) is the residual at the rows B, q
     the squared norm of the residual at the sampled rows. It multiplies det(G + B^T B) by
-    q + z^T (I + M)^-1 z, and M becomes M + z z^T / q. One step costs O(s e (s + k)), instead of a
-    determinant for each element.
+    q + z^T (I + M)^-1 z, and M becomes M + z z^T / q.
 
     picked : sampled elements in order of selection
     """
@@ -89,11 +87,8 @@ class _Sampled:
             self._products = self._blocks @ self._inverse() @ self._blocks.transpose(0, 2, 1)
 
     def best(self, mode: int | None = None) -> int:
-        """Element with which the sampled rows of the modes used so far have the largest S-measure.
-
-        ``mode``, if given, is added to these modes. Ties go to the first element. SamplingError if
-        the modes are dependent whichever element is added.
-        """
+        """First element with which the sampled rows of the modes used so far, and of ``mode``, have
+        the largest S-measure; SamplingError if the modes are dependent whichever is added."""
         if not self.picked and mode is not None:
             return int(np.argmax(self._squares[:, mode]))
         shifted = self._products + np.eye(self._products.shape[1])  # I + M (M: see `_Sampled`)

@@ -52,9 +52,9 @@ def displacement_modes(
 ) -> np.ndarray:
     """First k mass-weighted POD modes (N, k) of displacements minus their affine part.
 
-    Each axis of each frame of ``trajectory`` (n, N, 3) is one snapshot, so that x, y and z share
-    the modes (Monem et al. 2023). If the data have fewer modes, all are returned. ``points`` (N, 3)
-    m is the rest shape, ``masses`` (N,) are in kg.
+    Each axis of each frame of ``trajectory`` (n, N, 3) is one snapshot (Monem et al. 2023). If the
+    data have fewer modes, all are returned. ``points`` (N, 3) m is the rest shape, ``masses`` (N,)
+    are in kg.
     """
     displacements = (trajectory - points).transpose(1, 0, 2).reshape(len(points), -1)
     weight = np.sqrt(masses)[:, None]
@@ -77,10 +77,9 @@ def build_columns(
 ) -> Columns:
     """Build a subspace from ``modes`` (N, k) of the free vertices and own columns of each atom.
 
-    Each of ``atoms``, vertices fixed and released together, gets affine columns, and POD modes of
-    the non-affine part of its motion in ``trajectory`` (n, N, 3) m, up to the error `OWN_MOTION`;
-    if that is None, its rows of ``modes``.
-    ``points`` (N, 3) m is the rest shape, ``masses`` (N,) are in kg.
+    Each of ``atoms`` gets affine columns, and POD modes of the non-affine part of its motion in
+    ``trajectory`` (n, N, 3) m, up to the error `OWN_MOTION`; if that is None, its rows of
+    ``modes``. ``points`` (N, 3) m is the rest shape, ``masses`` (N,) are in kg.
     """
     n = len(points)
     free_vertices = np.setdiff1d(np.arange(n), np.concatenate([np.empty(0, np.int64), *atoms]))
@@ -134,7 +133,7 @@ def orthonormal(columns: np.ndarray) -> np.ndarray:
 def atoms(units: Sequence[np.ndarray], vertices: int) -> list[np.ndarray]:
     """Divide the vertices of all ``units``, sets that may overlap, into disjoint sets ("atoms").
 
-    Vertices that belong to the same units form an atom, so that every unit is a union of atoms.
+    Every unit is a union of atoms.
     """
     if not units:
         return []

@@ -73,8 +73,7 @@ def training_run(
 ) -> list[TrainingFrame]:
     """Run ``scene`` in a subspace with all projections; return the iterates of ``frames``.
 
-    ``frames`` are ascending. The run begins at ``start``, a state in coordinates (K, 3), or at the
-    scene's initial state if that is None.
+    The run begins at ``start``, a state in coordinates (K, 3), or (None) at the initial state.
     """
     watched = _Watched(scene.groups[0], columns)
     steps = [watched, *(SubspaceLocalStep(group, columns) for group in scene.groups[1:])]
@@ -148,16 +147,7 @@ def ecsw_elements(
     random (seeded) subset, which is doubled, up to `MOST`, until all tolerances are met. ``choose``
     replaces the search (see `Choose`).
     """
-    count, totals, force = CANDIDATES, list[np.ndarray](), False
-    for frame, (_, differences, sums) in zip(
-        training, _forces(group, columns.B, training), strict=True
-    ):
-        noise = ROUNDOFF * group.roundoff(columns.B @ frame.start) * np.sqrt(len(frame.pairs))
-        force = force or float(np.linalg.norm(differences)) > noise
-        totals.append(sums)
-    if not force:
-        every = Samples(np.arange(group.elements), np.ones(group.elements), 0.0)
-        return [every] * len(tolerances)
+    count = CANDIDATES
 
     def residual(elements: np.ndarray, factors: np.ndarray) -> float:
         """Relative residual of the training equations with these samples, without hashing."""
@@ -172,7 +162,10 @@ def ecsw_elements(
         if count < group.elements:
             chosen = np.random.default_rng(SEED).choice(group.elements, count, replace=False)
             eligible = np.sort(chosen)
-        rows, sums = training_equations(group, columns, training, eligible)
+        rows, sums, totals, force = training_equations(group, columns, training, eligible)
+        if not force:
+            every = Samples(np.arange(group.elements), np.ones(group.elements), 0.0)
+            return [every] * len(tolerances)
         if choose is not None:
             own = [_checked(choose(rows, sums, bound), len(eligible)) for bound in tolerances]
             return [Samples(eligible[at], xi, residual(eligible[at], xi)) for at, xi in own]
@@ -205,9 +198,8 @@ def _forces(
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield, for each training frame, the factors of the sum of g_e over a ``group``, and the sum.
 
-    ``rows`` (n, K) are those of the columns B at the n vertices of the group. Factors are B^T S^T W
-    times `TrainingFrame.measure`, transposed, (e p, K'), and S B z' - p(B z) (e p, 3 m) of m
-    iterates side by side; the sum is (K', 3 m).
+    ``rows`` (n, K) are those of the columns B at the group's vertices. Factors are B^T S^T W times
+    `TrainingFrame.measure`, transposed, (e p, K'), and S B z' - p(B z) (e p, 3 m) of m iterates.
     """
     group, strain = group.for_run(), np.ascontiguousarray(group.S @ rows)
     weighted = strain * group.row_weights[:, None]
@@ -227,13 +219,15 @@ def _forces(
 
 def training_equations(
     group: ConstraintGroup, columns: Columns, training: Training, elements: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray], bool]:
     """Return the matrix (m, len(elements)) and right-hand sides (m,) that the factors xi_e fit.
 
+    Return also the sums over all elements in each frame, and whether any force exceeds round-off.
+
     For each training iterate z, the next one z' and each coordinate, a row of the matrix has entry
-    g_e = B^T S_e^T w_e (S_e B z' - p_e(B z)), times `TrainingFrame.measure`. Right-hand sides are
-    sums over all elements, scaled to norm 1 with the rows. The last row has the shares of the total
-    weight, so that a group with small forces keeps its stiffness. The matrix is in Fortran order.
+    g_e, times `TrainingFrame.measure`. Right-hand sides are sums over all elements, scaled to norm
+    1 with the rows. The last row has the shares of the total weight, so that a group with small
+    forces keeps its stiffness. The matrix is in Fortran order.
 
     The equations are hashed to at most `SKETCH` K rows (B has K columns) with seeded random signs,
     which changes norms of residuals by a few per cent (count sketch, Charikar et al. 2002).
@@ -242,10 +236,15 @@ def training_equations(
     size = min(SKETCH * columns.B.shape[1], equations)
     generator = np.random.default_rng(SEED)
     rows, sums, norm = np.zeros((len(elements), size + 1)), np.zeros(size + 1), 0.0
-    shape, made = (group.elements, group.rows_per_element, -1), _forces(group, columns.B, training)
-    for _, batch in groupby(enumerate(made), key=lambda own: (own[0] // BATCH, id(own[1][0]))):
+    shape, totals, force = (group.elements, group.rows_per_element, -1), list[np.ndarray](), False
+    made = enumerate(zip(training, _forces(group, columns.B, training), strict=True))
+    for _, batch in groupby(made, key=lambda own: (own[0] // BATCH, id(own[1][0].measure))):
         parts = []
-        for _, (lifted, differences, sums_of_all) in batch:
+        for _, (frame, (lifted, differences, sums_of_all)) in batch:
+            totals.append(sums_of_all)
+            if not force:
+                noise = group.roundoff(columns.B @ frame.start) * np.sqrt(len(frame.pairs))
+                force = float(np.linalg.norm(differences)) > ROUNDOFF * noise
             norm += float(np.sum(sums_of_all**2))
             entries = lifted.shape[1], 3
             drawn = [
@@ -264,7 +263,7 @@ def training_equations(
         sums /= np.sqrt(norm)
     share = group.weights / group.weights.sum()
     rows[:, -1], sums[-1] = share[elements], 1.0
-    return rows.T, sums
+    return rows.T, sums, totals, force
 
 
 @compiled
@@ -341,7 +340,7 @@ class _ActiveSet:
     """
 
     def __init__(self, g: np.ndarray, b: np.ndarray, apart: int = 0) -> None:
-        """Search with the matrix ``g`` (m, e), in Fortran order for speed, and ``b`` (m,).
+        """Search with ``g`` (m, e), in Fortran order for speed, and ``b`` (m,).
 
         The last ``apart`` rows have a relative residual of their own; the larger one counts.
         """
@@ -464,8 +463,8 @@ class _ActiveSet:
 def _remove_row(factor, n, column):
     """Update the Cholesky ``factor`` (n, n) of a matrix that loses its row and column ``column``.
 
-    The rows below move up; the removed column is added to their part of the factor by a rank-one
-    update (Gill, Golub, Murray, Saunders 1974, method C1).
+    The removed column is added to the part of the factor below by a rank-one update (Gill, Golub,
+    Murray, Saunders 1974, method C1).
     """
     lost = factor[column + 1 : n, column].copy()
     for j in range(column, n - 1):

@@ -91,26 +91,10 @@ def require_known(config: SceneConfig) -> None:
         )
 
 
-def export_models(scene: Scene, models: Sequence[Labelled]) -> dict[str, Any]:
-    """Export the bases of all ``models``, and each model with its labels and its basis's index."""
-    of_basis: dict[int, list[SubspaceModel]] = {}
-    for _, model in models:
-        of_basis.setdefault(id(model.columns), []).append(model)
-    places = list(of_basis)
-    return {
-        "bases": [_basis(scene, own) for own in of_basis.values()],
-        "models": [
-            {**labels, "basis": places.index(id(model.columns)), **_model(scene, model)}
-            for labels, model in models
-        ],
-    }
-
-
 def _basis(scene: Scene, models: Sequence[SubspaceModel]) -> dict[str, Any]:
     """Export the data that ``models`` with the same columns share.
 
-    They are the columns, the inertia matrix, the initial state and the forces in the subspace. Rows
-    of vertices that iterations use are always exported as doubles.
+    Rows of vertices that iterations use are always exported as doubles.
     """
     columns = models[0].columns
     space, start = ReducedSpace(scene, columns, []), reduced_state(scene, columns)
@@ -189,12 +173,20 @@ def export_page(
     full = scene.mesh.points[None] if reference is None else reference
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
     stride = max(1, ceil((len(full) - 1) * len(used) / GHOST))
+    of_basis: dict[int, list[SubspaceModel]] = {}
+    for _, model in models:
+        of_basis.setdefault(id(model.columns), []).append(model)
+    places = list(of_basis)
     return {
         "format": FORMAT,
         "scene": scene.config.name,
         "title": title,
         **export_scene(scene),
-        **export_models(scene, models),
+        "bases": [_basis(scene, own) for own in of_basis.values()],
+        "models": [
+            {**labels, "basis": places.index(id(model.columns)), **_model(scene, model)}
+            for labels, model in models
+        ],
         # the surface, and positions of its vertices in every ``stride``-th full-order frame
         "shown": {
             "vertices": pack_array(used, "u4"),

@@ -103,8 +103,7 @@ def interpolation_of(
 class SubspaceLocalStep:
     """Local step in subspace coordinates z: B^T S^T W p(S B z), summed over some or all elements.
 
-    ``factors`` multiply weights of ``elements``. With all elements and factors 1 it is exact in the
-    subspace. With energy-conserving sampling its cost does not depend on the size of the mesh.
+    ``factors`` multiply weights of ``elements``; all elements with factors 1 are exact.
     """
 
     def __init__(

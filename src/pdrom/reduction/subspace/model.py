@@ -180,10 +180,9 @@ def stored_samples(store: h5py.Group) -> dict[str, Samples | Interpolation]:
     """Samples of each constraint group in the HDF5 group ``store`` by `store_model`."""
     found: dict[str, Samples | Interpolation] = {}
     for name, kept in store.get("samples", {}).items():
-        arrays = {key: array[...] for key, array in kept.items()}
         numbers: dict[str, Any] = {key: float(value) for key, value in kept.attrs.items()}
         kind = Interpolation if "gain" in numbers else Samples
-        found[name] = kind(**arrays, **numbers)
+        found[name] = kind(**{key: array[...] for key, array in kept.items()}, **numbers)
     return found
 
 

@@ -1,9 +1,8 @@
 """Products of small dense matrices with vectors, and projections, in compiled loops of a subspace.
 
 The matrix of a product is stored in blocks of `TALL` rows, each block column by column, so that the
-sums of all rows of a block are computed side by side. Vectors are stored as three numbers each, but
-read and written four numbers at a time; their arrays have space for the additional numbers
-(`vectors`). Every sum is in the order of the columns on all processors.
+sums of all rows of a block are computed side by side, in the order of the columns. Vectors are read
+and written four numbers at a time, although they have three: arrays of `vectors` have space.
 """
 
 import numpy as np

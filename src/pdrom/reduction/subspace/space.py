@@ -254,6 +254,7 @@ class _ReducedContact:
         self._probes = np.ascontiguousarray(columns.B[self._vertices])
         self._columns = columns
         self._project = projector(columns, scene.masses)
+        self._held: dict[bytes, np.ndarray] = {}
 
     def free_frames(self, path: np.ndarray) -> int:
         """Number of frames in ``path`` (n, K, 3) before a probe (vertex) is below this floor."""
@@ -265,8 +266,9 @@ class _ReducedContact:
     def correct(self, y: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
         probed = self._probes @ y
         corrected = probed.copy()
-        held_probes = np.flatnonzero(np.isin(self._vertices, held))
-        self._contact.apply(corrected, self._probes @ before, held_probes)
+        if (key := held.tobytes()) not in self._held:
+            self._held[key] = np.flatnonzero(np.isin(self._vertices, held))
+        self._contact.apply(corrected, self._probes @ before, self._held[key])
         if np.array_equal(probed, corrected):
             return
         # fixed y do not change: only held vertices depend on them, and contacts do not move these

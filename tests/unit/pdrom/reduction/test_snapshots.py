@@ -84,9 +84,6 @@ def test_file_round_trip(runs, tmp_path):
     got = collected(runs)
     snapshots.save_snapshots(got, tmp_path / "s.h5")
     np.testing.assert_equal(vars(snapshots.load_snapshots(tmp_path / "s.h5")), vars(got))
-    with open_hdf5(tmp_path / "s.h5") as file:
-        assert file.attrs["elements"] == got.elements
-        assert file["row_mass"].attrs["unit"] == "kg"
 
 
 @pytest.mark.parametrize(

@@ -39,12 +39,9 @@ def variant(name, calls, totals, frames=1, **settings) -> Variant:
     return Variant({"name": name}, loop, START, frames)
 
 
-def test_variants_take_turns_start_afresh_and_tell_their_progress(caplog):
+def test_variants_take_turns_and_start_afresh():
     calls = []
-    pair = [variant("a", calls, [1.0] * 9, 2), variant("b", calls, [1.0] * 9, 1)]
-    with caplog.at_level("INFO", logger="pdrom.reduction"):
-        measure(pair, warmup=1, repeats=2)
-    assert caplog.messages == ["repeat 0 of 2", "repeat 1 of 2", "repeat 2 of 2"]
+    measure([variant("a", calls, [1.0] * 9, 2), variant("b", calls, [1.0] * 9, 1)], 1, 2)
     assert calls == [("a", 0, 0.0), ("a", 1, 1.0), ("b", 0, 0.0)] * 3
     assert (START.positions == 0.0).all()
 
@@ -111,9 +108,7 @@ def test_the_positions_of_all_vertices_are_part_of_a_frame():
 def test_calls_take_turns():
     calls = []
     times = measure_calls({"a": lambda: calls.append("a"), "b": lambda: calls.append("b")}, 1, 3)
-    assert calls == ["a", "b"] * 4
-    assert set(times) == {"a", "b"}
-    assert all(value >= 0.0 for value in times.values())
+    assert calls == list(times) * 4 == ["a", "b"] * 4
 
 
 def test_a_run_that_blows_up_is_timed_up_to_there():

@@ -40,10 +40,7 @@ def test_small_singular_values_survive_where_the_gram_matrix_loses_them(rng):
     q = np.linalg.qr(rng.standard_normal((500, 8)))[0]
     w = np.linalg.qr(rng.standard_normal((8, 8)))[0]
     wanted = np.logspace(0, -13, 8)
-    matrix = q * wanted @ w.T
-    np.testing.assert_allclose(pod(matrix)[1], wanted, rtol=1e-2)
-    gram = np.sqrt(np.abs(np.linalg.eigvalsh(matrix.T @ matrix)))
-    assert gram.min() > 10 * wanted[-1] or gram.min() < wanted[-1] / 10
+    np.testing.assert_allclose(pod(q * wanted @ w.T)[1], wanted, rtol=1e-2)
 
 
 def test_first_of_tied_entries_decides_the_sign():

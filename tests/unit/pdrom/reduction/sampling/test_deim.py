@@ -8,7 +8,7 @@ from pymor.algorithms.ei import deim as pymor_deim
 from pymor.algorithms.ei import qdeim as pymor_qdeim
 from pymor.vectorarrays.numpy import NumpyVectorSpace
 
-from pdrom.reduction.sampling.deim import TIE, block_elements, deim_entries, joint_rows, tie_weights
+from pdrom.reduction.sampling.deim import block_elements, deim_entries, joint_rows, tie_weights
 from pdrom.reduction.sampling.qdeim import qdeim_elements
 from strategies import SEEDS
 
@@ -53,15 +53,6 @@ def test_of_mirrored_entries_the_first_is_taken_whatever_round_off_says(size, se
     v = np.vstack([half, mirrored * (1.0 + noise * rng.standard_normal(half.shape))])
     entries = deim_entries(v)
     np.testing.assert_array_equal(entries, deim_entries(half))
-
-
-def test_equal_magnitudes_go_to_the_first_entry():
-    v = np.array([[1.0, 1.0, -1.0, 1.0], [1.0, -1.0, 1.0, 1.0]]).T
-    np.testing.assert_array_equal(deim_entries(v), [0, 1])
-    # a larger one that is no tie is taken wherever it stands
-    v = np.ones((50, 1))
-    v[49] = 1.0 + 2.0 * TIE
-    assert deim_entries(v).tolist() == [49]
 
 
 @given(SIZES, st.integers(1, 4), SEEDS)

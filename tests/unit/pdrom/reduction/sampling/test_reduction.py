@@ -112,11 +112,9 @@ def test_gain_is_the_norm_of_the_pseudo_inverse_and_bounds_the_error(name, seed)
 def test_selections_and_numbers_of_rows_and_elements_are_those_of_the_presets():
     """Each algorithm is reached: no two methods pick the same entries."""
     by_name = {name: made(spec, 21, 7)[1] for name, spec in PRESETS.items()}
-    assert by_name["pod"].rows_sampled == ROWS
-    assert by_name["block-deim"].rows_sampled == by_name["block-qdeim"].rows_sampled == 7 * P
-    assert by_name["deim-joint"].rows_sampled == 7
-    assert by_name["deim"].rows_sampled <= 7
     names = ("deim", "qdeim", "deim-joint", "block-deim", "block-qdeim")
+    rows = [by_name[name].rows_sampled for name in ("pod", *names[2:])]
+    assert rows == [ROWS, 7, 7 * P, 7 * P]
     assert len({tuple(by_name[name].sampling.entries.tolist()) for name in names}) == len(names)
     for reduction in by_name.values():
         assert len(reduction.elements) == len(np.unique(reduction.elements))

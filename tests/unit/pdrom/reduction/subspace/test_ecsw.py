@@ -71,7 +71,8 @@ def test_sampled_equations_meet_the_tolerance(pulled):
     scene, _, columns = pulled
     training = ecsw.training_run(scene, columns, np.arange(0, 12, 3))
     for group in scene.groups:
-        rows, total = ecsw.training_equations(group, columns, training, np.arange(group.elements))
+        every = np.arange(group.elements)
+        rows, total, *_ = ecsw.training_equations(group, columns, training, every)
         np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-9)
         forces = exact_forces(group, columns, training)
         counts = []
@@ -112,7 +113,7 @@ def test_a_part_of_a_group_stands_for_all_and_grows_where_it_misses(
     scene, _, columns = pulled
     group = scene.groups[number]
     training = ecsw.training_run(scene, columns, [2, 8])
-    rows, total = ecsw.training_equations(group, columns, training, np.arange(group.elements))
+    rows, total, *_ = ecsw.training_equations(group, columns, training, np.arange(group.elements))
     candidates = group.elements // 2 if number else 3
     monkeypatch.setattr(ecsw, "CANDIDATES", candidates)
     (samples,) = ecsw.ecsw_elements(group, columns, training, [tolerance])
@@ -162,7 +163,7 @@ def test_training_equations_are_those_of_the_elements(rng):
     frame = ecsw.TrainingFrame(before, pair[None], measure)
     expected = exact_forces(group, columns, [frame])
     expected /= np.linalg.norm(expected.sum(axis=1))
-    rows, total = ecsw.training_equations(group, columns, [frame], np.arange(group.elements))
+    rows, total, *_ = ecsw.training_equations(group, columns, [frame], np.arange(group.elements))
     assert rows.shape == (count + 1, group.elements)
     np.testing.assert_allclose(rows.sum(axis=1), total, atol=1e-12)
     np.testing.assert_allclose(rows[-1], group.weights / group.weights.sum(), rtol=1e-14)
