@@ -21,12 +21,8 @@ from pdrom.reduction.method import MethodSpec
         {"rows": "all", "gain_bound": 2.0},
         {"rows": "joint", "gain_bound": 2.0},
         {"rows": "element", "coefficients": "per-axis", "gain_bound": 2.0},
-        {"rows": "element", "gain_bound": 1.0},
         {"rows": "joint", "solve": "square", "repeat_rows": True},
-        {"rows": "vertices"},
         {"rows": "all", "oversampling": 3},
-        {"rows": "all", "tikhonov": 0.0},
-        {},
     ],
 )
 def test_combinations_that_do_not_exist_are_refused(fault):

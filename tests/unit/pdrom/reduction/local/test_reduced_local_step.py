@@ -142,24 +142,6 @@ def test_the_local_kernel_adds_what_python_code_adds(preset, group_scene):
     assert np.abs(total - rhs).max() <= 1e-12 * np.abs(rhs).max()
 
 
-@pytest.mark.parametrize("preset", [name for name in PRESETS if name != "published"])
-def test_real_groups_reproduce_their_full_local_step(group_scene, preset):
-    """Snapshots of random positions; at one of them all modes give the group's own S^T W p."""
-    group, rest = group_scene.groups[0].for_run(), group_scene.mesh.points
-    positions = near(rest, 5)
-    group.begin_frame(rest)
-    reduction = whole(group, np.stack([group.project(q) for q in positions]), preset)
-    step = ReducedLocalStep(group, reduction)
-    for q in positions:
-        full, reduced = np.zeros_like(q), np.zeros_like(q)
-        group.begin_frame(rest)
-        group.accumulate(q, full)
-        step.begin_frame(rest)
-        step.accumulate(q, reduced)
-        tolerance = 1e-11 * reduction.gain * np.abs(full).max()
-        np.testing.assert_allclose(reduced, full, atol=tolerance)
-
-
 EFFECTS = {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}, TOP
 
 

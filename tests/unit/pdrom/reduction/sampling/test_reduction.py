@@ -167,21 +167,14 @@ def test_path_holds_the_selection_of_every_rank(name):
             select_path(basis, spec, ranks)
 
 
-@pytest.mark.parametrize("preset", PRESETS)
-def test_reduction_from_files_is_the_same(preset, tmp_path):
-    spec = PRESETS[preset]
-    p, mass = data(27)
-    basis = compute_basis(p, mass, 0.0, P, spec)
-    sampling = select(basis, spec, 4)
-    with write_hdf5(tmp_path / "sampling.h5") as file:
-        file["r0004/entries"], file["r0004/elements"] = sampling.entries, sampling.elements
-    loaded = load_reduction(basis, tmp_path / "sampling.h5", spec, 4)
-    assert isinstance(loaded.sampling, Sampling)
-    np.testing.assert_array_equal(
-        loaded.reconstruct(p), Reduction(basis, sampling, spec, 4).reconstruct(p)
-    )
+def test_reduction_from_files_is_the_same(tmp_path):
+    path, (p, own) = tmp_path / "sampling.h5", made(PRESETS["deim"], 27, 4)
+    with write_hdf5(path) as file:
+        file["r0004/entries"], file["r0004/elements"] = own.sampling.entries, own.elements
+    loaded = load_reduction(own.basis, path, own.spec, 4)
+    np.testing.assert_array_equal(loaded.reconstruct(p), own.reconstruct(p))
     with pytest.raises(StorageError, match=r"sampling\.h5"):
-        load_reduction(basis, tmp_path / "sampling.h5", spec, 5)
+        load_reduction(own.basis, path, own.spec, 5)
 
 
 @pytest.mark.parametrize("selection", INGREDIENTS["selection"])
@@ -219,13 +212,11 @@ def test_entries_belong_to_elements_in_order_of_need():
 
 
 def test_faulty_entries_are_named():
-    for entries in ([], [-1], [36], [0, 36]):
-        with pytest.raises(SamplingError, match="allowed are 0 to 35"):
+    for entries in ([], [-1], [36], [0, 36], [3, 3]):
+        with pytest.raises(SamplingError):
             Sampling.of_entries(np.array(entries, dtype=int), 2, 6)
-    with pytest.raises(SamplingError, match="repeated"):
-        Sampling.of_entries(np.array([3, 3]), 1, 4)
     assert Sampling.of_entries(np.array([3, 3]), 1, 4, repeats=True).entries.tolist() == [3, 3]
-    with pytest.raises(SamplingError, match="repeated"):
+    with pytest.raises(SamplingError):
         Sampling.of_elements(np.array([2, 2]), 1, 4)
 
 

@@ -118,44 +118,33 @@ def test_displacement_modes_are_the_mass_weighted_pod_and_no_more_than_the_data_
 
 @pytest.mark.parametrize("handles", [1, 2, 5, 12, 30])
 def test_skinning_weights_are_a_partition_of_unity(handles):
+    """Whatever the place and size of the points."""
     points = make_scene(SPRING).mesh.points
     weights = spaces.skinning_weights(points, handles)
     assert weights.shape == (30, handles)
-    assert (weights >= 0.0).all()
-    assert (weights <= 1.0).all()
+    assert weights.min() >= 0.0
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-13)
-    assert (weights.max(axis=0) > 0.0).all()
     assert np.linalg.matrix_rank(weights) == handles
-    # whatever their place and size
     again = spaces.skinning_weights(7.0 * points + 3.0, handles)
     np.testing.assert_allclose(again, weights, atol=1e-12)
 
 
-@pytest.mark.parametrize("k", [1, 4, 9, 20])
+@pytest.mark.parametrize("k", [1, 4, 9, 500])
 def test_skinning_modes_are_mass_orthonormal_without_affine_part(moved, k):
+    """They end at the size of the mesh: all but the three affine columns of a flat sheet."""
     scene, _ = moved
     points, masses = scene.mesh.points, scene.masses
-    modes = spaces.skinning_modes(points, masses, k)
-    np.testing.assert_allclose(modes.T @ (masses[:, None] * modes), np.eye(k), atol=1e-9)
-    np.testing.assert_allclose(
-        spaces.affine_columns(points).T @ (masses[:, None] * modes), 0.0, atol=1e-8
-    )
-    # they end at the size of the mesh: all but the three affine columns of a flat sheet
-    assert spaces.skinning_modes(points, masses, 500).shape[1] == scene.mesh.vertices - 3
+    modes, count = spaces.skinning_modes(points, masses, k), min(k, len(points) - 3)
+    assert modes.T @ (masses[:, None] * modes) == pytest.approx(np.eye(count), abs=1e-9)
+    affine = spaces.affine_columns(points).T @ (masses[:, None] * modes)
+    assert affine == pytest.approx(np.zeros((4, count)), abs=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("matrix", "words"),
-    [
-        (np.diag([1.0, -1.0]), "reduced system of size 2"),
-        # a stiffness of 1 between six coordinates, and 1e-12 of it for all of them together
-        (np.eye(6) - np.full((6, 6), 1.0 / 6.0) + 1e-12 * np.eye(6), "a solve is wrong by"),
-    ],
-    ids=["indefinite", "without enough digits"],
-)
-def test_a_system_that_cannot_be_solved_is_a_named_error(matrix, words):
-    with pytest.raises(SolverError, match=words):
-        DenseElimination(matrix, np.empty(0, dtype=np.int64))
+def test_a_system_that_cannot_be_solved_is_an_error():
+    """Indefinite; a stiffness of 1 between six coordinates, and 1e-12 of it for all together."""
+    for matrix in (np.diag([1.0, -1.0]), (1.0 + 1e-12) * np.eye(6) - np.full((6, 6), 1.0 / 6.0)):
+        with pytest.raises(SolverError):
+            DenseElimination(matrix, np.empty(0, dtype=np.int64))
 
 
 @pytest.mark.parametrize("mass", [1e-100, 1e-6, 1.0, 1e100])
