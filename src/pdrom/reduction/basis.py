@@ -111,11 +111,8 @@ def compute_basis(
     snapshots : (n, e p, 3) projections of e elements with p rows each
     row_mass : (e p,) kg, used by mass weighting
     roundoff : Frobenius norm of the rounding errors in ``snapshots``
-    rows_per_element : p
     signs : generator that draws the sign of each mode; None keeps all signs. Signs matter only with
-        centring "mean-in-modes": it adds the first snapshot to every mode, so that the span of the
-        modes depends on their signs.
-    spec : weighting, centring and layout
+        centring "mean-in-modes", which adds the first snapshot to every mode.
     """
     _check(snapshots, row_mass, rows_per_element, spec)
     require_finite("round-off of the snapshots", np.array([roundoff]), SnapshotError)
@@ -170,10 +167,7 @@ def basis_of(
     data: SnapshotSet, spec: BasisSpec, train: np.ndarray | None = None,
     signs: np.random.Generator | None = None,
 ) -> Basis:  # fmt: skip
-    """Compute the POD basis of the training snapshots of ``data``, by the recipe ``spec``.
-
-    Snapshots ``train`` (n, e p, 3) replace them if given; ``signs`` draws random signs of modes.
-    """
+    """Compute the POD basis of the training snapshots of ``data``, or of ``train`` (n, e p, 3)."""
     snapshots, p = data.train if train is None else train, data.rows_per_element
     return compute_basis(snapshots, data.row_mass, data.roundoff, p, spec, signs)
 
@@ -181,10 +175,7 @@ def basis_of(
 def group_basis(
     group: ConstraintGroup, masses: np.ndarray, p: np.ndarray, roundoff: float, spec: BasisSpec
 ) -> Basis:
-    """Compute the POD basis of snapshots ``p`` (n, e p, 3) of ``group``, by the recipe ``spec``.
-
-    ``masses`` (N,) kg are those of the vertices; ``roundoff`` is the norm of rounding errors in p.
-    """
+    """Compute the POD basis of snapshots ``p`` of ``group``, with vertex ``masses`` (N,) kg."""
     return compute_basis(p, row_masses(group, masses), roundoff, group.rows_per_element, spec)
 
 

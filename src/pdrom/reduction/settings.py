@@ -1,7 +1,5 @@
-"""Settings that simulate one scene, each a point of error and time: the trade-off of a scene.
-
-A setting is a method with its numbers: iterations of the full order, on the scene's own or on a
-coarser mesh, or a reduced model.
+"""Settings that simulate one scene, each a point of error and time: iterations of the full order,
+on the scene's own or on a coarser mesh, or a reduced model.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -124,8 +124,7 @@ def _time_once(variant: Variant, frames: int) -> np.ndarray:
 def median_frames(samples: np.ndarray) -> np.ndarray:
     """Mean time (phases,) over frames of ``samples`` (repeats, frames, phases).
 
-    Each frame's times are those of the repeat with the median total (the first phase),
-    since medians of single phases would not add up to the total.
+    Times of a frame are those of the repeat with the median total (the first phase).
     """
     order = np.argsort(samples[:, :, 0], axis=0, kind="stable")[len(samples) // 2]
     return samples[order, np.arange(samples.shape[1])].mean(axis=0)

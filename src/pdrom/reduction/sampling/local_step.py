@@ -21,8 +21,8 @@ from pdrom.model.dynamics.stepper import LocalStep
 from pdrom.model.scene import Scene
 from pdrom.reduction.sampling.reduction import Reduction
 
-# Indices into the record (int64 array) of the kernel of `Lift`: numbers of modes, coefficient sets,
-# columns (see `Lift`), samples; addresses of the sampling kernel, of its record and of all arrays.
+# Indices into the record (int64 array) of the kernel: numbers of modes, coefficient sets, columns
+# (see `Lift`), samples; addresses of the sampling kernel, of its record and of all arrays.
 MODES, SETS, COLUMNS, SAMPLED, SAMPLER, SAMPLER_RECORD = range(OWN, OWN + 6)
 STARTS, POSITIONS, PACKED, OPERATORS, SHIFTS, COEFFICIENTS = range(OWN + 6, OWN + 12)
 AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 12, OWN + 20)
@@ -55,17 +55,6 @@ class Lift:
     lifted: np.ndarray
     offset: np.ndarray
     seconds: np.ndarray
-
-    def kernel(self, sampler: LocalKernel, sampled: int) -> LocalKernel:
-        """Compiled local step; ``sampler`` projects the sampled elements: ``sampled`` numbers."""
-        columns, vertices, modes = self.lifted.shape
-        numbers = (
-            modes, len(self.shifts), columns, sampled, sampler.address, sampler.record.ctypes.data
-        )  # fmt: skip
-        # the kernel's record lists the arrays of `Lift` in the order of its fields
-        own = vars(self).values()
-        arrays = (*own, np.empty(sampled), clock(), sampler.record, *sampler.arrays)
-        return LocalKernel(_accumulate, vertices, arrays, numbers)
 
 
 @compiled(nogil=True)
@@ -171,7 +160,14 @@ class ReducedLocalStep:
         self.local_kernel: LocalKernel | None = None
         if self._group.local_kernel is not None:
             sampled = 3 * group.rows_per_element * len(self._elements)
-            self.local_kernel = lift.kernel(self._group.sampler(self._elements), sampled)
+            columns, vertices, modes = lift.lifted.shape
+            sampler = self._group.sampler(self._elements)
+            places = sampler.address, sampler.record.ctypes.data
+            numbers = modes, len(lift.shifts), columns, sampled, *places
+            # the kernel's record lists the arrays of `Lift` in the order of its fields
+            own = *vars(lift).values(), np.empty(sampled), clock()
+            arrays = *own, sampler.record, *sampler.arrays
+            self.local_kernel = LocalKernel(_accumulate, vertices, arrays, numbers)
 
     def for_run(self) -> Self:
         """Return the step with memory of its own for all that a run writes, matrices shared."""

@@ -199,8 +199,7 @@ def select(basis: Basis, spec: MethodSpec, r: int) -> Sampling:
 def select_path(basis: Basis, spec: MethodSpec, ranks: Sequence[int]) -> dict[int, Sampling]:
     """Select samples of ``basis`` by the method ``spec`` for each number r of modes in ``ranks``.
 
-    Greedy samples for r modes begin with those for fewer modes; samples beyond one per mode depend
-    on all r modes. RankError if an r is below 1 or exceeds the numerical rank of the basis.
+    RankError if an r is below 1 or exceeds the numerical rank of the basis.
     """
     if not ranks:
         return {}

@@ -131,10 +131,7 @@ def orthonormal(columns: np.ndarray) -> np.ndarray:
 
 
 def atoms(units: Sequence[np.ndarray], vertices: int) -> list[np.ndarray]:
-    """Divide the vertices of all ``units``, sets that may overlap, into disjoint sets ("atoms").
-
-    Every unit is a union of atoms.
-    """
+    """Divide all ``units``, sets that may overlap, into atoms: every unit is a union of atoms."""
     if not units:
         return []
     member = np.zeros((vertices, len(units)), dtype=bool)

@@ -164,11 +164,10 @@ def write_page_models(
 def export_page(
     scene: Scene, title: str, reference: np.ndarray | None, models: Sequence[Labelled]
 ) -> dict[str, Any]:
-    """Export ``models`` and a full-order run of ``scene``: the content of a page.
+    """Export ``models``, with labels that the page shows, and a full-order run of ``scene``.
 
     ``reference`` (F + 1, N, 3) m are positions of the run, of which some frames are shown; None
-    without a run. ``models`` are pairs (labels, which the page shows; model). SceneError if the
-    browser's code cannot run the scene.
+    without a run. SceneError if the browser's code cannot run the scene.
     """
     full = scene.mesh.points[None] if reference is None else reference
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)

@@ -33,10 +33,9 @@ from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
 
 class FusedStepper(Stepper):
-    """Step loop with compiled, fused iterations; results equal those of `Stepper` up to round-off.
+    """Step loop with compiled, fused iterations, whose whole time counts as that of the local step.
 
-    The whole time of iterations counts as that of the local step. If a local step is no
-    `SubspaceLocalStep` or a group has no `gradient_kernel`, this class iterates like `Stepper`.
+    It iterates like `Stepper` if a local step is no `SubspaceLocalStep` or lacks a gradient kernel.
     """
 
     def __init__(
@@ -216,8 +215,7 @@ def run_iterations(count, size, rows, operators, sampled, history, newton):
     """Do ``count`` iterations that change ``size`` free subspace coordinates z in place.
 
     rows : number of rows of all sampled elements
-    operators : matrices and vectors `_Operators.iterated`, z among them
-    sampled : data of the sampled elements, `_Sampled.arrays`
+    operators, sampled : `_Operators.iterated`, with z; `_Sampled.arrays`
     history : arrays of Anderson acceleration, see `Anderson`; `NO_HISTORY` without it
     newton : `newton_arrays`; with them, iterations are those of `run_newton`
     """

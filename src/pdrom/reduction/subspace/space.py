@@ -80,17 +80,13 @@ def require_effects(scene: Scene) -> None:
             )
 
 
-# Largest number of probes, the vertices at which contacts are detected.
-PROBES = 200
+PROBES = 200  # largest number of probes, the vertices at which contacts are detected
 
 
 class ReducedSpace(Space):
     """Forces, boundary conditions, contacts and system matrix in coordinates z (K, 3), q = B z.
 
     matrices : stiffness B^T S^T W S B (K, K) of each group, summed over all or sampled elements
-
-    Attributes
-    ----------
     matrix : (K, K) system matrix A: inertia and stiffness
     inertia_matrix : (K, K) B^T M B / h^2
     forces : c (K, 3) and a, a number or (K, K), of each force: it accelerates by c + a v at the

@@ -26,7 +26,7 @@ def make_columns(
 
     scenes : training scenes, on one mesh; what one of them holds has columns of its own
     training : (n, N, 3) m, positions in the training frames
-    pod, skinning : numbers of POD modes of the training frames, and of skinning modes
+    pod, skinning : numbers of POD modes and of skinning modes
     own : (N, k) columns instead of POD modes
     hold : further sets of vertices that a scene may hold
     """
