@@ -30,31 +30,19 @@ AXES, OWN_SETS, LIFTED, OFFSET, SECONDS, PROJECTIONS, CLOCK, SIZE = range(OWN + 
 
 @dataclass(frozen=True)
 class Lift:
-    """Arrays of a reduced local step: r modes, N vertices, coefficient sets (one, or one per axis).
+    """Arrays of a reduced local step: r modes, N vertices, sets of coefficients (one or three)."""
 
-    starts : (sets + 1,) indices in ``positions`` at which the entries of each coefficient set begin
-    positions : index of each sampled entry in the projections of the sampled elements
-    packed : working memory for the sampled entries of one set
-    operators : matrix (r, m) of each set that maps m samples to coefficients, all flattened
-    shifts : (sets, r) operator times the mean at sampled entries, subtracted from coefficients
-    coefficients : (sets, r) coefficients of the last evaluation
-    axes, own_sets : (c,) for each reconstructed column (x, y, z): axis, set of its coefficients
-    lifted : (c, N, r) S^T W V of each column
-    offset : (4 N,) S^T W mean, flat, with a zero after the three numbers of each vertex
-    seconds : (1,) s, accumulated time of the reconstruction
-    """
-
-    starts: np.ndarray
-    positions: np.ndarray
-    packed: np.ndarray
-    operators: np.ndarray
-    shifts: np.ndarray
-    coefficients: np.ndarray
-    axes: np.ndarray
-    own_sets: np.ndarray
-    lifted: np.ndarray
-    offset: np.ndarray
-    seconds: np.ndarray
+    starts: np.ndarray  # (sets + 1,) indices in ``positions`` where entries of each set begin
+    positions: np.ndarray  # index of each sampled entry in the projections of sampled elements
+    packed: np.ndarray  # working memory for the sampled entries of one set
+    operators: np.ndarray  # matrix (r, m) of each set: m samples to coefficients, all flattened
+    shifts: np.ndarray  # (sets, r) operator times the mean at sampled entries, to be subtracted
+    coefficients: np.ndarray  # (sets, r) coefficients of the last evaluation
+    axes: np.ndarray  # (c,) axis of each reconstructed column (x, y, z)
+    own_sets: np.ndarray  # (c,) set of its coefficients
+    lifted: np.ndarray  # (c, N, r) S^T W V of each column
+    offset: np.ndarray  # (4 N,) S^T W mean, flat, with a zero after the numbers of each vertex
+    seconds: np.ndarray  # (1,) s, accumulated time of the reconstruction
 
 
 @compiled(nogil=True)

@@ -97,17 +97,12 @@ def element_rows(elements: np.ndarray, size: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Block:
-    """One set of coefficients: shared by all axes (``axis`` None), or of a single axis.
-
-    entries : sampled entries of the vectorised projection that determine the coefficients
-    matrix : (m, r) the basis at these entries
-    operator : (r, m) matrix that maps sampled values to coefficients
-    """
+    """One set of coefficients: shared by all axes (``axis`` None), or of a single axis."""
 
     axis: int | None
-    entries: np.ndarray
-    matrix: np.ndarray
-    operator: np.ndarray
+    entries: np.ndarray  # (m,) sampled entries that determine the coefficients
+    matrix: np.ndarray  # (m, r) the basis at these entries
+    operator: np.ndarray  # (r, m) matrix that maps sampled values to coefficients
 
     @property
     def output(self) -> slice:

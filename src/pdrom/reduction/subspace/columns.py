@@ -26,20 +26,13 @@ ROUNDOFF = 100.0 * np.finfo(float).eps
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns of a position subspace.
+    """Columns of a position subspace."""
 
-    B : (N, K) columns; those of the free vertices are mass-orthonormal
-    free : indices of the columns of the free vertices
-    atoms : sets of vertices that boundary conditions fix and release together
-    atom_columns : for each atom, the indices of its columns
-    modes : number k of modes of the free vertices; their four columns 1, x, y, z do not count
-    """
-
-    B: np.ndarray
-    free: np.ndarray
-    atoms: list[np.ndarray]
-    atom_columns: list[np.ndarray]
-    modes: int
+    B: np.ndarray  # (N, K) columns; those of the free vertices are mass-orthonormal
+    free: np.ndarray  # indices of the columns of the free vertices
+    atoms: list[np.ndarray]  # sets of vertices that boundary conditions fix and release together
+    atom_columns: list[np.ndarray]  # for each atom, the indices of its columns
+    modes: int  # number k of modes of the free vertices, without their columns 1, x, y, z
 
 
 def affine_columns(points: np.ndarray) -> np.ndarray:

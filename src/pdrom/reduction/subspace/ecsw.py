@@ -39,14 +39,12 @@ from pdrom.reduction.subspace.space import ReducedSpace, reduced_state
 class TrainingFrame:
     """Iterates of one frame of the training run.
 
-    start : (K, 3) subspace coordinates at the frame's start, for data computed once per frame
-    pairs : (n, 2, K, 3) coordinates before and after each iteration
-    measure : (K', K) matrix for residuals r (K,), of which the entries of K - K' fixed coordinates
-        do not count: |measure r|^2, J, is r^T A^-1 r with the system matrix A
+    ``measure`` (K', K) is for residuals r (K,), of which the entries of K - K' fixed coordinates
+    do not count: |measure r|^2, J, is r^T A^-1 r with the system matrix A.
     """
 
-    start: np.ndarray
-    pairs: np.ndarray
+    start: np.ndarray  # (K, 3) coordinates at the frame's start, for data computed once per frame
+    pairs: np.ndarray  # (n, 2, K, 3) coordinates before and after each iteration
     measure: np.ndarray
 
 
