@@ -29,21 +29,16 @@ class Basis:
     V : (3 e p, rank); orthonormal (with mass weighting in the inner product of the row masses), or
         orthonormal axis by axis if the recipe has `BasisSpec.separate_axes`
     mean : (3 e p,), zero unless the snapshots are centred
-    singular_values : all singular values of the matrix of weighted, centred training snapshots
-    rank : number of singular values above round-off, which is the number of columns of V
-    roundoff : singular values up to this absolute size are noise
-    active_axes : for each axis x, y, z, whether its snapshots exceed round-off
-    origin : name of the basis in error messages: the path of its file
     """
 
     V: np.ndarray
     mean: np.ndarray
-    singular_values: np.ndarray
-    rank: int
-    roundoff: float
+    singular_values: np.ndarray  # all of the matrix of weighted, centred training snapshots
+    rank: int  # number of singular values above round-off: columns of V
+    roundoff: float  # singular values up to this absolute size are noise
     rows_per_element: int
-    active_axes: tuple[bool, ...]
-    origin: str = "basis"
+    active_axes: tuple[bool, ...]  # for each axis x, y, z, whether its snapshots exceed round-off
+    origin: str = "basis"  # name in error messages: the path of its file
 
     __repr__ = brief
 

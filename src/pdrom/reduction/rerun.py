@@ -13,22 +13,14 @@ from pdrom.model.scene import Scene
 
 @dataclass(frozen=True)
 class Rerun:
-    """Result of a reduced run; one that blows up ends in the frame `blowup_frame`.
+    """Result of a reduced run; one that blows up ends in the frame `blowup_frame`."""
 
-    positions : (F' + 1, N, 3) m of the initial state and of F' finite frames
-    difference : (F',) m, || Q_red - Q_fom ||_F of reduced and full-order positions in each frame
-    extent : (F',) longest side of the bounding box in each frame, divided by that of the rest shape
-    blowup_frame : first frame whose extent exceeds `BoundedRun.limit` or is not finite, else None
-    coordinates : (F' + 1, K, 3) K unknowns of the step loop: subspace coordinates, or positions
-    ms : (F',) milliseconds of each frame, with the positions of all vertices
-    """
-
-    positions: np.ndarray
-    difference: np.ndarray
-    extent: np.ndarray
-    blowup_frame: int | None
-    coordinates: np.ndarray
-    ms: np.ndarray
+    positions: np.ndarray  # (F' + 1, N, 3) m of the initial state and of F' finite frames
+    difference: np.ndarray  # (F',) m, || Q_red - Q_fom ||_F of the positions in each frame
+    extent: np.ndarray  # (F',) longest side of the bounding box, divided by that of the rest shape
+    blowup_frame: int | None  # first frame beyond `BoundedRun.limit` or not finite, else None
+    coordinates: np.ndarray  # (F' + 1, K, 3) unknowns: subspace coordinates, or positions
+    ms: np.ndarray  # (F',) milliseconds of each frame, with the positions of all vertices
 
     __repr__ = brief
 

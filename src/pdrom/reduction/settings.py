@@ -29,21 +29,17 @@ def _same(value: Any) -> Any:
 class Setting:
     """A method with its settings, ready to run on one scene.
 
-    labels : columns that tell it from others
-    loop, start : step loop and first state, in its unknowns
     positions : function of the unknowns that returns the positions (N, 3) m of the scene's vertices
     output : a faster form of it, which is timed; None: the unknowns are these positions
-    state : function that maps a state of all vertices to one of the unknowns
-    steps : number of steps (frames of ``loop``) into which a frame of the scene is divided
     """
 
-    labels: dict[str, Any]
+    labels: dict[str, Any]  # columns that tell it from others
     loop: Stepper
-    start: State
+    start: State  # first state, in its unknowns
     positions: Callable[[np.ndarray], np.ndarray] = _same
     output: Callable[[np.ndarray], np.ndarray] | None = None
-    state: Callable[[State], State] = _same
-    steps: int = 1
+    state: Callable[[State], State] = _same  # maps a state of all vertices to one of the unknowns
+    steps: int = 1  # frames of ``loop`` into which a frame of the scene is divided
 
     def run(self, frames: int, extent: float) -> np.ndarray | None:
         """Run it; return positions (F + 1, N, 3) m at the start and at the ends of F frames.

@@ -33,26 +33,23 @@ _INNER = ("assembly_seconds", "lift_seconds")
 class Variant:
     """A step loop to time.
 
-    labels : first columns of its row in the table of times
-    loop, start, frames : step loop, state before the first frame, number of frames
     share : fraction of a frame's iterations that the loop does; the times of phases inside the
         iterations are divided by it
     output : function of coordinates in a subspace that returns the positions of all vertices; it is
         called after every ``steps`` steps of the loop
     starts : pairs (state, number of the next step); if there are any, ``steps`` steps are timed
         from each of them in turn, in place of the first ``frames``
-    warm : number of frames of an unmeasured run; None for ``frames``
     """
 
-    labels: dict[str, Any]
+    labels: dict[str, Any]  # first columns of its row in the table of times
     loop: Stepper
-    start: State
+    start: State  # before the first frame
     frames: int
     share: float = 1.0
     output: Callable[[np.ndarray], np.ndarray] | None = None
     steps: int = 1
     starts: tuple[tuple[State, int], ...] = ()
-    warm: int | None = None
+    warm: int | None = None  # number of frames of an unmeasured run; None for ``frames``
 
 
 def model_variant(labels: dict[str, Any], scene: Scene, model: Reduced, frames: int) -> Variant:

@@ -13,7 +13,7 @@ import numpy as np
 from pdrom.model.compiled import rows
 from pdrom.model.compiled.dots import dots
 from pdrom.model.compiled.functions import clock, compiled, now
-from pdrom.model.compiled.rows import WIDTH, as_vertices, at, flat, shares, unflat
+from pdrom.model.compiled.rows import WIDTH, as_vertices, at, flat, unflat
 from pdrom.model.constraints import local_kernel as kernels
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.constraints.local_kernel import OWN, LocalKernel
@@ -190,11 +190,9 @@ class ReducedLocalStep:
 
     def lift(self, rhs: np.ndarray) -> None:
         """Add S^T W (mean + V c) with the coefficients of the last `solve` to ``rhs`` (N, 3)."""
-        data, right = self._lift, flat(rhs)
-        added = right if shares(rhs, right) else np.zeros_like(right)
+        data, added = self._lift, np.zeros(len(self._lift.offset))
         lift(data.coefficients, data.axes, data.own_sets, data.lifted, data.offset, added)
-        if added is not right:
-            rhs += unflat(added)
+        rhs += unflat(added)
 
     @property
     def lift_seconds(self) -> float:

@@ -8,6 +8,7 @@ mesh. The weights themselves, which the source adds as columns for translations,
 S annihilates translations.
 """
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -50,27 +51,14 @@ def hrpd(group: ConstraintGroup, columns: Columns, sampled: "SampledSpace | None
     return Interpolation(sampled.elements, sampled.operator, modes, offset, stiffness, sampled.gain)
 
 
+@dataclass(frozen=True)
 class SampledSpace:
-    """A space of projections, and the operator that fits its coefficients to sampled elements.
+    """A space of projections, and the operator that fits its coefficients to sampled elements."""
 
-    V : (e p, d) basis, orthonormal in the inner product of the weights W; used for x, y and z
-    elements : (m,) sampled elements, ascending
-    operator : (d, m p) maps sampled projections to coefficients by weighted least squares
-    gain : amplification of errors || (P^T W^(1/2) V)^+ ||_2, P^T selects the sampled rows
-    """
-
-    def __init__(self, group: ConstraintGroup, V: np.ndarray, elements: np.ndarray) -> None:
-        rows = element_rows(elements, group.rows_per_element)
-        root = np.sqrt(group.row_weights[rows])
-        weighted = root[:, None] * V[rows]
-        operator = solution_operator(weighted, "qr", 0.0)
-        self.gain, condition = norm_and_condition(weighted, operator)
-        if condition > SINGULAR:
-            raise SamplingError(
-                f"hrpd: group '{group.name}': {len(elements)} samples do not determine a space of "
-                f"dimension {V.shape[1]}; allowed are more samples or a smaller dimension"
-            )
-        self.V, self.elements, self.operator = V, elements, operator * root
+    V: np.ndarray  # (e p, d) basis, orthonormal in the inner product of the weights W; for x, y, z
+    elements: np.ndarray  # (m,) sampled elements, ascending
+    operator: np.ndarray  # (d, m p) maps sampled projections to coefficients, by least squares in W
+    gain: float  # amplification of errors || (P^T W^(1/2) V)^+ ||_2, P^T selects the sampled rows
 
 
 def sampled_space(
@@ -83,11 +71,20 @@ def sampled_space(
     rest = group.S @ points
     if np.linalg.norm(rest) <= group.roundoff(points):
         return None
-    centres = element_centres(group, points)
-    count = min(spec.samples, group.elements)
+    centres, count = element_centres(group, points), min(spec.samples, group.elements)
     elements = np.sort(farthest_points(centres, np.arange(group.elements), count))
     V = projection_space(rest, centres, group.row_weights, spec.dimension)
-    return SampledSpace(group, V, elements)
+    rows = element_rows(elements, group.rows_per_element)
+    root = np.sqrt(group.row_weights[rows])
+    weighted = root[:, None] * V[rows]
+    operator = solution_operator(weighted, "qr", 0.0)
+    gain, condition = norm_and_condition(weighted, operator)
+    if condition > SINGULAR:
+        raise SamplingError(
+            f"hrpd: group '{group.name}': {len(elements)} samples do not determine a space of "
+            f"dimension {V.shape[1]}; allowed are more samples or a smaller dimension"
+        )
+    return SampledSpace(V, elements, operator * root, gain)
 
 
 def projection_space(

@@ -17,21 +17,16 @@ from pdrom.reduction.subspace.columns import Columns
 class Interpolation:
     """Arrays that one group needs during a run, in a subspace of K coordinates.
 
-    elements : (m,) sampled elements of p rows, ascending; none if the projections are constant
     operator : (r, n), maps sampled values to coefficients; n = m p if it is applied to each axis
         (coefficients (r, 3)), n = 3 m p if the axes share the coefficients (r, 1)
-    modes : B^T S^T W V, (K, r) for coefficients of each axis, (3 K, r) for shared ones
-    offset : (K, 3) constant part of the right-hand side
-    stiffness : (K, K) B^T S^T W S B of all elements
-    gain : || operator ||_2, the largest factor by which errors of samples grow
     """
 
-    elements: np.ndarray
+    elements: np.ndarray  # (m,) sampled, of p rows, ascending; none if projections are constant
     operator: np.ndarray
-    modes: np.ndarray
-    offset: np.ndarray
-    stiffness: np.ndarray
-    gain: float
+    modes: np.ndarray  # B^T S^T W V, (K, r) for coefficients of each axis, (3 K, r) for shared ones
+    offset: np.ndarray  # (K, 3) constant part of the right-hand side
+    stiffness: np.ndarray  # (K, K) B^T S^T W S B of all elements
+    gain: float  # || operator ||_2, the largest factor by which errors of samples grow
 
 
 class InterpolatedLocalStep:
