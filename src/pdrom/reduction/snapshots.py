@@ -53,10 +53,10 @@ def touched_vertices(group: ConstraintGroup) -> sparse.csr_array:
 def recorded(
     scene: Scene, group: str, state: State, frames: int | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run a scene in full order from ``state``; return, of the first ``frames`` (None: all):
+    """Run a scene in full order from ``state``; return positions, projections, their round-off.
 
-    positions (F + 1, N, 3) m, projections (F, e p, 3) of the constraint ``group`` with e elements
-    of p rows in the last local step of every frame, and norms (F,) of their rounding errors.
+    Of the first ``frames`` frames (None: all) these are (F + 1, N, 3) m, (F, e p, 3) of the last
+    local step of the constraint ``group`` (e elements of p rows), and (F,) norms of their errors.
     """
     loop, positions = scene.stepper(track_objective=False), [state.positions]
     own, projections, roundoff = loop.local_step(group), list[np.ndarray](), list[float]()
