@@ -19,6 +19,7 @@ Euclidean norm the stiff coordinates would hide errors of the soft ones, which d
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from typing import Any
 
@@ -200,6 +201,10 @@ def _forces(
     `TrainingFrame.measure`, transposed, (e p, K'), and S B z' - p(B z) (e p, 3 m) of m iterates.
     """
     group, strain = group.for_run(), np.ascontiguousarray(group.S @ rows)
+    project: Callable[[np.ndarray], np.ndarray] = group.project
+    if group.local_kernel is not None:  # one kernel for all iterates
+        sampler = group.sampler(np.arange(group.elements))
+        project = partial(sampler.projections, count=len(strain))
     weighted = strain * group.row_weights[:, None]
     for _, alike in groupby(training, key=lambda frame: id(frame.measure)):
         frames = list(alike)
@@ -211,7 +216,7 @@ def _forces(
             positions, differences = rows @ before, strain @ after
             for pair in range(0, differences.shape[1], 3):
                 at = slice(pair, pair + 3)
-                differences[:, at] -= group.project(np.ascontiguousarray(positions[:, at]))
+                differences[:, at] -= project(np.ascontiguousarray(positions[:, at]))
             yield lifted, differences, lifted.T @ differences
 
 
