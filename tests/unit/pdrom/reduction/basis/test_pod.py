@@ -1,9 +1,11 @@
-"""POD against a dense SVD; its orthonormality, accuracy and sign convention."""
+"""POD against a dense SVD and pyMOR; its orthonormality, accuracy and sign convention."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymor.algorithms.pod import pod as pymor_pod
+from pymor.vectorarrays.numpy import NumpyVectorSpace
 from scipy import linalg
 
 from pdrom.reduction import basis as module
@@ -41,6 +43,14 @@ def test_small_singular_values_survive_where_the_gram_matrix_loses_them(rng):
     w = np.linalg.qr(rng.standard_normal((8, 8)))[0]
     wanted = np.logspace(0, -13, 8)
     np.testing.assert_allclose(pod(q * wanted @ w.T)[1], wanted, rtol=1e-2)
+
+
+def test_agrees_with_pymor(rng):
+    matrix = rng.standard_normal((200, 12)) * np.logspace(0, -3, 12)
+    modes, sigma = pymor_pod(NumpyVectorSpace(200).from_numpy(matrix), method="qr_svd", rtol=0.0)
+    u, ours = pod(matrix)
+    np.testing.assert_allclose(ours, sigma, rtol=1e-11)
+    np.testing.assert_allclose(u, fix_signs(modes.to_numpy()), atol=1e-9)
 
 
 def test_first_of_tied_entries_decides_the_sign():
