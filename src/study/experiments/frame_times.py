@@ -21,7 +21,7 @@ from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.sampling import select
 from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.snapshots import load_snapshots
-from pdrom.reduction.subspace.model import SubspaceModel, load_models
+from pdrom.reduction.subspace.model import load_models
 from pdrom.reduction.timing import Variant, model_variant
 from study.artifact import paths
 from study.artifact.paths import File
@@ -29,7 +29,7 @@ from study.artifact.reads import EachOf, Settings
 from study.experiments.kit.base import Modes, OfScene, PositionBasis, experiment
 from study.experiments.kit.costs import variant
 from study.experiments.kit.measurement import Processes, in_processes
-from study.experiments.kit.runfiles import load_reduction
+from study.experiments.kit.models import Model, load_reduction
 
 FULL, CONTROL, REDUCED = "full", "control", "reduced"
 COLUMNS = [
@@ -82,7 +82,7 @@ class Options(ConfigModel):
     projection_methods: dict[str, MethodSpec]
 
 
-Models = list[tuple[dict[str, Any], ProjectionModel | SubspaceModel]]
+Models = list[tuple[dict[str, Any], Model]]
 
 
 def variants(scene: Scene, models: Models, frames: int) -> Iterator[Variant]:

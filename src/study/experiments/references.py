@@ -13,15 +13,15 @@ from pydantic import Field
 
 from pdrom.core.store import open_hdf5, write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel
-from pdrom.model.metrics import affine_residuals
+from pdrom.model.metrics import affine_residuals, trajectory_error
 from pdrom.model.runs import ConvergedStepper
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.deviations import Yardstick
+from pdrom.reduction.rerun import displacement_norms
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 
 log = logging.getLogger(__name__)
@@ -91,7 +91,7 @@ def references(
         own = kit.positions_of(run)
         training = training or (own, first)
         row = {"scene": config.name, "motion": motion, "frames": frames, "horizon_frame": end}
-        row |= {"evaluations": evaluations, "playback_all": runfiles.run_error(training[0], own)}
+        row |= {"evaluations": evaluations, "playback_all": run_error(training[0], own)}
         row |= _errors("playback", Yardstick(scene, own), training[0], end)
         with write_hdf5(runs[motion].path) as store:
             if first is None:
@@ -154,3 +154,9 @@ def converged_positions(run: File, frames: int | None = None) -> np.ndarray | No
     with open_hdf5(run.path) as file:
         stored = file.get("positions")
         return None if stored is None else stored[: None if frames is None else frames + 1]
+
+
+def run_error(run: np.ndarray, reference: np.ndarray) -> float | None:
+    """Relative error of ``run`` (F + 1, N, 3) m against ``reference``; None if this never moves."""
+    difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
+    return trajectory_error(difference, displacement_norms(reference))

@@ -17,13 +17,13 @@ from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.dynamics.space import VertexSpace
 from pdrom.model.dynamics.stepper import State, Stepper
 from pdrom.model.effects.base import Contact, Effect, Force, Seed
-from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.rerun import mean_motion
-from study.artifact.paths import CONTRIBUTIONS, MESH, SENSITIVITY, File
-from study.artifact.reads import Setting
-from study.experiments.kit.base import experiment, perturbation_field, scene_of
+from study.artifact.paths import CONTRIBUTIONS, FULL_ORDER, MESH, SENSITIVITY, File
+from study.artifact.reads import Every, Setting
+from study.experiments.kit import base as kit
+from study.experiments.kit.base import experiment
 
 Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
 EFFECTS = ["scene", "effect", "role", "frame", "force", "energy"]
@@ -58,23 +58,36 @@ class Sensitivity(PerturbedRuns):
 
 @experiment(
     "Perturbed full-order runs of {scene}",
-    reads={"mesh": MESH, "config": Setting("scene"), "chosen": Setting("sensitivity")},
+    reads={
+        "mesh": MESH,
+        "full_order": Every(FULL_ORDER),
+        "config": Setting("scene"),
+        "chosen": Setting("sensitivity"),
+    },
     writes={"out": SENSITIVITY, "effects": CONTRIBUTIONS},
 )
 def sensitivity(
-    mesh: File, config: SceneConfig, chosen: PerturbedRuns, out: File, effects: File
+    mesh: File,
+    full_order: list[File],
+    config: SceneConfig,
+    chosen: PerturbedRuns,
+    out: File,
+    effects: File,
 ) -> None:
     """Run a scene and its held-out motions from perturbed starts; also vary the scene's settings.
 
     Differences from unchanged runs go to ``out``, forces and energies of effects to ``effects``.
     """
-    scene = scene_of(config, mesh)
-    parts = [sensitivities(scene, chosen.perturbations, chosen.seeds)]
-    for motion in MOTIONS:  # each held-out motion has a horizon of its own
-        other = scene_of(config, mesh, motion)
-        parts += perturbed(other, trajectory(other), chosen.reference, chosen.seeds, motion)
+    parts: list[pd.DataFrame] = []
+    for run in full_order:  # each held-out motion has a horizon of its own
+        motion, base = run["run"], kit.positions_of(run)
+        scene = kit.scene_of(config, mesh, motion)
+        if motion == kit.TRAIN:
+            parts.append(sensitivities(scene, base, chosen.perturbations, chosen.seeds))
+            write_table(contributions(scene), effects.path)
+        else:
+            parts += perturbed(scene, base, chosen.reference, chosen.seeds, motion)
     write_table(pd.concat(parts, ignore_index=True), out.path)
-    write_table(contributions(scene), effects.path)
 
 
 class _Watched:
@@ -183,19 +196,21 @@ def perturbed(
     unperturbed run; column ``perturbation`` has the value ``label``.
     """
     for seed in seeds:
-        other = trajectory(scene, perturbation_field(scene, size, seed))
+        other = trajectory(scene, kit.perturbation_field(scene, size, seed))
         yield _rows(scene, label, seed, relative_difference(other, base))
 
 
 def sensitivities(
-    scene: Scene, perturbations: tuple[float, ...], seeds: tuple[int, ...]
+    scene: Scene, base: np.ndarray, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
     """Table by frame: relative differences of perturbed and changed runs from the run of ``scene``.
+
+    Positions of this run are ``base`` (F + 1, N, 3) m.
 
     The changes are another solver, four times the iterations, half the time step, and the scene
     without all effects of one name (unless it would have no constraint group left).
     """
-    base, config = trajectory(scene), scene.config
+    config = scene.config
     parts: list[pd.DataFrame] = []
     for size in perturbations:
         parts += perturbed(scene, base, size, seeds, f"{size:g}")

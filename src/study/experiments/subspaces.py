@@ -17,7 +17,6 @@ import pandas as pd
 
 from pdrom.core.store import write_hdf5, write_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
-from pdrom.model.energy import largest
 from pdrom.model.held_out import MOTIONS
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
@@ -35,9 +34,10 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Every, Setting, Settings, SourcesOf
 from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
-from study.experiments.references import converged_positions
+from study.experiments.kit.models import load_reduction
+from study.experiments.kit.runs import Row, run, store_series
+from study.experiments.references import converged_positions, run_error
 
 log = logging.getLogger(__name__)
 
@@ -190,11 +190,9 @@ def _runs(
     ``file`` receives the models and, if ``compared``, also the subspace coordinates of each run and
     its deviations from the full-order run.
     """
-    rows: list[dict[str, Any]] = []
+    rows: list[Row] = []
     training = motions[kit.TRAIN]
-    played = {
-        name: runfiles.run_error(training.reference, m.reference) for name, m in motions.items()
-    }
+    played = {name: run_error(training.reference, m.reference) for name, m in motions.items()}
     for labels, model in _models(training, settings):
         base = f"{labels['position_basis']}_k{labels['k']:03d}"
         if f"columns/{base}" not in file:
@@ -202,19 +200,18 @@ def _runs(
         store = file.create_group(f"models/{base}_{labels['method']}")
         kept = {name: labels[name] for name in ("method", "position_basis", "k")}
         subspace.store_model(store, {**kept, "base": base}, model.samples)
+        own = {"group": "all", "training_residual": model.residual, **labels}
         for name, motion in motions.items():
-            outcome = motion.run(model)
-            row = motion.row(outcome) | labels | {"motion": name, "group": "all"}
-            row |= {"playback_error": played[name], "training_residual": model.residual}
-            row |= {"scene": motion.scene.config.name, "r": model.elements_evaluated(motion.scene)}
+            scene = motion.scene
+            own |= {"scene": scene.config.name, "r": model.elements_evaluated(scene)}
+            row, outcome = run(motion, model, own | {"motion": name})
+            row["playback_error"] = played[name]
             if compared:
-                seen = motion.deviations(outcome)
-                row["energy_ratio"] = largest(seen["energy"])
-                series = {"coordinates": outcome.coordinates, "extent": outcome.extent, **seen}
-                for key, values in series.items():
-                    store[f"{name}/{key}"] = values
+                series = {"coordinates": outcome.coordinates}
+                made = store.create_group(name)
+                row["energy_ratio"] = store_series(made, motion, outcome, **series)
             else:
-                end = motion.scene.config.frames
+                end = scene.config.frames
                 row["deformation_error"] = motion.errors(outcome.positions, end)[1]
             rows.append(row)
             log.info("%s %s, %s: error %s", base, labels["method"], name, row["relative_error"])
@@ -330,7 +327,7 @@ def live(mesh: File, train: File, settings: Options, out: File, **files: list[Fi
         basis = load_basis(file.path)
         # use the requested size, or the rank if it is smaller
         size = min(asked.joint_rows, basis.rank)
-        reduction = runfiles.load_reduction(basis, sampling.path, case.spec, size)
+        reduction = load_reduction(basis, sampling.path, case.spec, size)
         chosen += list(_joint(scene, case.group, reduction, chosen))
     exported.write_page_models(scene, settings.title, reference, chosen, out.path)
     log.info("%s: %d models", settings.scene.name, len(chosen))

@@ -25,7 +25,7 @@ from pdrom.reduction.sampling import Reduction, reductions
 from pdrom.reduction.sampling.local_step import ReducedLocalStep
 from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.snapshots import recorded
-from pdrom.reduction.subspace.model import load_models
+from pdrom.reduction.subspace.model import SubspaceModel
 from pdrom.reduction.subspace.training import make_columns, sampled_models
 from pdrom.reduction.timing import Variant, measure, model_variant
 from study.artifact import paths
@@ -34,10 +34,10 @@ from study.artifact.reads import Every, Settings, SourcesOf
 from study.experiments.iterations import IterationCounts
 from study.experiments.iterations import settings as full_order_settings
 from study.experiments.kit import base as kit
-from study.experiments.kit import runfiles
 from study.experiments.kit.base import experiment
 from study.experiments.kit.costs import effect_costs, left_out, local_costs, variant
 from study.experiments.kit.measurement import Protocol
+from study.experiments.kit.models import stored_models
 
 
 class NumpyLocalStep:
@@ -161,21 +161,19 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     common["implementation"] = "compiled"
     alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
     sizes = (*settings.ranks, *asked.breakeven)
-    given = files["samplings"], files["bases"], settings.methods, sizes
-    for labels, reduced in runfiles.projection_models(*given):
-        if reduced is None:
-            continue
-        reduction, r = reduced.reduction, labels["r"]
-        if r in kit.resolve_ranks(settings.ranks, reduction.basis.rank):
-            quick.append(model_variant({**common, **labels}, scene, reduced, frames))
-        by_itself = r in kit.resolve_ranks(asked.breakeven, reduction.basis.rank)
-        if by_itself and reduction.spec.rows != "all":
-            step = ReducedLocalStep(scene.group(reduced.group), reduction)
-            alone[reduced.group, labels["method"], r] = step
-    for file in files["subspaces"]:
-        for own, model in load_models(file.path):
-            labels = {**common, "iterations": None, "group": "all", **own}
+    given = files["samplings"], files["bases"], settings.methods, sizes, files["subspaces"]
+    for labels, model in stored_models(*given):
+        if isinstance(model, SubspaceModel):
+            labels = common | {"iterations": None} | labels
             quick.append(model_variant(labels, scene, model, frames))
+        elif model is not None:
+            reduction, r = model.reduction, labels["r"]
+            if r in kit.resolve_ranks(settings.ranks, reduction.basis.rank):
+                quick.append(model_variant(common | labels, scene, model, frames))
+            by_itself = r in kit.resolve_ranks(asked.breakeven, reduction.basis.rank)
+            if by_itself and reduction.spec.rows != "all":
+                step = ReducedLocalStep(scene.group(model.group), reduction)
+                alone[model.group, labels["method"], r] = step
     log.info("%s: %d runs of %d frames", name, len(quick) + 1, frames)
     results = measure(quick, asked.warmup, asked.repeats) + measure([slow], 0, asked.repeats)
     write_table(pd.DataFrame(results, columns=COLUMNS), files["out"].path)
@@ -238,7 +236,7 @@ class Sized(Protocol):
     r: kit.Modes = 10
     k: kit.Modes = 20
     training_frames: TrainingFrames = 16
-    repeats: kit.Repeats = 9
+    repeats: kit.Repeats = 5
     breakeven: SizedBreakEven = SizedBreakEven()
 
 

@@ -26,9 +26,11 @@ from study.experiments.hard_cases.outcomes import HardCases
 from study.experiments.iterations import IterationCounts
 from study.experiments.kit.base import Rank
 from study.experiments.references import Reference
-from study.experiments.repetitions import LadderSection, Noise, RepetitionSection
-from study.experiments.reruns import Stability
+from study.experiments.repetitions.experiment import RepetitionSection
+from study.experiments.repetitions.ladder import LadderSection
+from study.experiments.repetitions.noise import Noise
 from study.experiments.sensitivity import Sensitivity
+from study.experiments.stability import Stability
 from study.experiments.subspaces import Live, Online, Subspace
 from study.experiments.timing import Scaling, Timing
 from study.pipeline import scenes as scene_kit

@@ -23,8 +23,8 @@ from study.artifact.markup import filled, to_tex
 from study.artifact.reads import Labels
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from study.experiments.kit.base import Horizon, OfScene
-from study.experiments.repetitions import Cell, Repeated
-from study.experiments.reruns import Stability
+from study.experiments.repetitions.experiment import Cell, Repeated
+from study.experiments.stability import Stability
 from study.experiments.subspaces import JOINT, JointRows
 from study.experiments.timing import SCALED
 from study.figures.kit.declaration import Drawn, Experiment, Reduction, declarations

@@ -6,11 +6,12 @@ Where reduced models are chosen, they and all others run validation motions, too
 """
 
 import logging
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from pathlib import Path
 from time import process_time
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -19,7 +20,6 @@ from pydantic import Field
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel
 from pdrom.model.coarser import Coarser, error_of_mesh, grids
-from pdrom.model.constraints.base import GroupConfig
 from pdrom.model.held_out import MOTIONS, PLAYBACK
 from pdrom.model.runs import converged_run, trajectory
 from pdrom.model.scene import Scene, SceneConfig
@@ -30,6 +30,7 @@ from pdrom.reduction.settings import (
     COARSER_ANDERSON,
     PLAIN,
     Setting,
+    Starts,
     full_order,
     loop_of,
 )
@@ -39,7 +40,7 @@ from pdrom.reduction.timing import Variant
 from study.artifact.paths import ALTERNATIVE_TIMES, ALTERNATIVES, File
 from study.artifact.reads import Setting as Configured
 from study.artifact.reads import SourcesOf
-from study.experiments.alternatives.solvers.methods import (
+from study.experiments.alternatives.solvers import (
     WINDOW,
     Chebyshev,
     TwoLevel,
@@ -62,7 +63,6 @@ SETTING: Final = [
     "tolerance",
 ]  # fmt: skip
 
-Factors = Annotated[tuple[Annotated[float, Field(gt=0.0, le=1e8)], ...], Field(min_length=1)]
 Work = Annotated[int, Field(ge=1, le=10**12, description="vertices times steps")]
 Steps = Annotated[
     tuple[kit.Count, kit.Count], Field(description="substeps of a frame, iterations of each")
@@ -104,7 +104,7 @@ class ReducedModel(ConfigModel):
     newton: tuple[kit.Count | Literal["converged"], ...] = ("converged",)
 
     @property
-    def runs(self) -> dict[str, list[int | None]]:
+    def runs(self) -> Mapping[str, Sequence[int | None]]:
         """Method -> numbers of iterations; None: converged."""
         steps = [None if isinstance(count, str) else count for count in self.newton]
         return {SAMPLED: [*self.iterations], NEWTON: steps}
@@ -120,7 +120,6 @@ class Comparison(Processes):
 
     Each of ``processes`` new processes times ``frames`` frames spread over each held-out motion.
 
-    stiffness : scene -> factors by which its groups' weights are multiplied; 1 without an entry
     steps : method -> pairs (substeps of a frame, iterations of each substep); only those of plain
         and accelerated iterations on the own mesh may have several substeps
     coarser : parts of the cells along a side that coarser meshes have
@@ -132,7 +131,6 @@ class Comparison(Processes):
     validation : number of motions on which models are chosen
     """
 
-    stiffness: dict[str, Factors] = Field(default_factory=dict)
     steps: dict[Method, tuple[Steps, ...]] = Field(default_factory=dict)
     coarser: kit.Parts = (2 / 3, *kit.PARTS)
     work: dict[Method | Literal["converged", "training"], Work] = Field(default_factory=dict)
@@ -141,12 +139,8 @@ class Comparison(Processes):
     seconds: Annotated[float, Field(gt=0.0, le=1e4)] = 2.0
     validation: Annotated[int, Field(ge=0, le=64)] = 0
     implicit: ImplicitReference = ImplicitReference()
-    frames: kit.Count = 20
+    frames: kit.Count = 10
     repeats: kit.Repeats = 1
-
-    def factors(self, scene: str, size: float) -> tuple[float, ...]:
-        """Factors of groups' weights in ``scene``; just (1.0,) unless ``size`` of its mesh is 1."""
-        return self.stiffness.get(scene, (1.0,)) if size == 1.0 else (1.0,)
 
     def pairs(self, method: Any, vertices: int) -> list[tuple[int, int]]:
         """Pairs (substeps, iterations) of ``method`` that `affords` allows for ``vertices``."""
@@ -177,19 +171,16 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Trained:
+class Trained(NamedTuple):
     """A reduced model, trained on a number of motions, and how it runs.
 
     labels : columns of tables that describe it
     iterations : method -> numbers of iterations; None: converged
-    coarse : whether the model is the coarse level of the two-level method
     """
 
     labels: dict[str, object]
     model: SubspaceModel
-    iterations: dict[str, list[int | None]] = field(default_factory=dict)
-    coarse: bool = False
+    iterations: Mapping[str, Sequence[int | None]]
 
 
 @dataclass(frozen=True)
@@ -205,17 +196,14 @@ class Case:
     def settings(self) -> Iterator[Setting]:
         """Yield every setting, ready to run; models were trained on other motions."""
         yield from self._full_order()
-        for own in self.models:
-            common = {**own.labels, "substeps": 1}
-            if own.coarse:
-                for _, count in self._pairs(TWO_LEVEL):
-                    labels = {**common, "method": TWO_LEVEL, "iterations": count}
-                    loop = TwoLevel(self.scene, count, own.model)
+        for known, model, runs in self.models:
+            for method, asked in ((m, count) for m, counts in runs.items() for count in counts):
+                labels = {**known, "substeps": 1, "method": method, "iterations": asked}
+                if method == TWO_LEVEL:
+                    loop = TwoLevel(self.scene, asked or 1, model)
                     yield Setting(labels, loop, self.scene.initial_state())
-            for method, counts in own.iterations.items():
-                for asked in counts:
-                    labels = {**common, "method": method, "iterations": asked}
-                    yield reduced(labels, self.scene, own.model, asked, method == NEWTON)
+                else:
+                    yield reduced(labels, self.scene, model, asked, method == NEWTON)
 
     def _full_order(self) -> Iterator[Setting]:
         for method, window in ACCELERATED.items():
@@ -229,12 +217,16 @@ class Case:
                     scene = substepped(self.scene, substeps).iterated(count, window)
                     yield loop_of(self._labels(method, substeps, count), scene, steps=substeps)
         scene, start = self.scene, self.scene.initial_state()
-        rates = {"chebyshev": None, "chebyshev-power": measured_rate}
-        for method, rate in rates.items():
+        for method in ("chebyshev", "chebyshev-power"):
             for _, count in self._pairs(method):
                 loop = Chebyshev(scene, count)
-                loop.rate = loop.rate if rate is None else rate(scene)
+                if method != loop.name:
+                    loop.rate = self._measured_rate
                 yield Setting(self._labels(method, 1, count), loop, start)
+
+    @cached_property
+    def _measured_rate(self) -> float:
+        return measured_rate(self.scene)
 
     def _pairs(self, method: str) -> list[tuple[int, int]]:
         return self.section.pairs(method, self.scene.mesh.vertices)
@@ -244,20 +236,25 @@ class Case:
         labels = {"method": method, "vertices": vertices, "substeps": substeps}
         return {**labels, "iterations": iterations}
 
-    def variants(self) -> Iterator[Variant]:
-        """Yield the step loops of all settings, to be timed."""
+    def starts(self) -> tuple[Starts, int]:
+        """States from which single frames are timed, and how many of them come first to warm up.
+
+        One frame for each set of active boundary conditions comes first: an unmeasured run of these
+        factorises all matrices, so that no measured frame has to.
+        """
         scene, wanted = self.scene, min(self.section.frames, self.scene.config.frames)
         places = np.linspace(0, scene.config.frames - 1, wanted).round().astype(int)
-        # One frame for each set of active boundary conditions comes first: an unmeasured run of
-        # these factorises all matrices, so that no measured frame has to.
         held = [tuple(b.active(frame) for b in scene.boundaries) for frame in places]
         first = [held.index(kind) for kind in dict.fromkeys(held)]
         places = np.concatenate([places[first], np.delete(places, first)])
         loop, states = scene.stepper(track_objective=False), [scene.initial_state()]
         states += [end for end, _ in loop.run(states[0], range(scene.config.frames))]
-        starts = tuple((states[frame], int(frame)) for frame in places)
+        return tuple((states[frame], int(frame)) for frame in places), len(first)
+
+    def variants(self, starts: Starts, warm: int) -> Iterator[Variant]:
+        """Yield the step loops of all settings, to be timed in a frame from each of ``starts``."""
         for each in self.settings():
-            yield each.variant(self.labels, wanted, starts, len(first))
+            yield each.variant(self.labels, len(starts), starts, warm)
 
 
 def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
@@ -289,19 +286,22 @@ def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
             started = process_time()
             columns = make_columns([training], frames, modes, skinning)
             own = [model for model in asked if model.columns == (modes, skinning)]
-            level = count == 1 and section.steps.get(TWO_LEVEL) and own[0] is section.models[0]
-            tolerances = [m.tolerance for m in own] + [COARSE_TAU] * bool(level)
+            runs = [(model.tolerance, model.runs) for model in own]
+            if count == 1 and section.steps.get(TWO_LEVEL) and own[0] is section.models[0]:
+                few = [own for _, own in section.pairs(TWO_LEVEL, vertices)]
+                runs.append((COARSE_TAU, {TWO_LEVEL: few}))
+            tolerances = [tolerance for tolerance, _ in runs]
             made = sampled_models(scenes, columns, np.arange(len(runs[0])), tolerances)
             seconds = spent + process_time() - started
             log.info("%d motions, %d + %d columns: %.0f s", count, modes, skinning, seconds)
-            for tolerance, model, spec in zip(tolerances, made, [*own, None], strict=False):
+            for (tolerance, iterations), model in zip(runs, made, strict=True):
                 labels: dict[str, object] = {
                     "vertices": vertices, "training_motions": count, "k": columns.modes,
                     "skinning": skinning, "tolerance": tolerance, "offline_s": seconds,
                     "elements_sampled": model.elements_evaluated(training),
                     "training_residual": model.residual,
                 }  # fmt: skip
-                yield Trained(labels, model, spec.runs if spec else {}, coarse=spec is None)
+                yield Trained(labels, model, iterations)
 
 
 def substepped(scene: Scene, substeps: int) -> Scene:
@@ -328,44 +328,35 @@ def alternatives(
     sources: list[Path], config: SceneConfig, section: Comparison, out: File, times: File
 ) -> None:
     """Compare all settings on the mesh with ``out["factor"]`` times the vertices along a side."""
-    factor = float(out["factor"])
-    rows, timed = [], []
+    factor, rows, timed = float(out["factor"]), [], []
     chosen = section.choice.get(f"{config.name}/{factor:g}")
-    validation = section.validation if chosen else 0
     section = section.model_copy(update={"models": chosen or section.models})
-    for stiffness in section.factors(config.name, factor):
-        finer = sized(config, factor, stiffness)
-        finer = finer.model_copy(update={"frames": round(section.seconds / finer.time_step)})
-        training = Scene.build(finer, finer.mesh.build(Path()))
-        models = tuple(trained(training, section))
-        recorded = trajectory(training, track_objective=False)
-        configs = {str(motion): finer.heldout_variant(motion) for motion in MOTIONS}
-        for number in range(validation):
-            configs[f"validation_{number + 1}"] = finer.training_variant(VALIDATION + number)
-        for motion, variant in configs.items():
-            scene = Scene.build(variant, training.mesh, training.masses)
-            labels = {"scene": config.name, "factor": factor, "stiffness": stiffness}
-            labels["motion"] = motion
-            case = Case(labels, scene, tuple(grids(scene, section.coarser)), models, section)
-            rows += [{**labels, **row} for row in _rows(case, recorded, motion in MOTIONS)]
-            if motion in MOTIONS:
-                timed.append(case.variants)
-        log.info("%s: stiffness %g done", config.name, stiffness)
+    finer = sized(config, factor)
+    finer = finer.model_copy(update={"frames": round(section.seconds / finer.time_step)})
+    training = Scene.build(finer, finer.mesh.build(Path()))
+    models = tuple(trained(training, section))
+    recorded = trajectory(training, track_objective=False)
+    configs = {str(motion): finer.heldout_variant(motion) for motion in MOTIONS}
+    for number in range(section.validation if chosen else 0):
+        configs[f"validation_{number + 1}"] = finer.training_variant(VALIDATION + number)
+    for motion, variant in configs.items():
+        scene = Scene.build(variant, training.mesh, training.masses)
+        labels = {"scene": config.name, "factor": factor, "stiffness": 1.0, "motion": motion}
+        case = Case(labels, scene, tuple(grids(scene, section.coarser)), models, section)
+        rows += [{**labels, **row} for row in _rows(case, recorded, motion in MOTIONS)]
+        if motion in MOTIONS:
+            timed.append(partial(case.variants, *case.starts()))
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
     measured = pd.DataFrame(in_processes(timed, section))
     write_table(measured.reindex(columns=TIME_COLUMNS), times.path)
 
 
-def sized(config: SceneConfig, factor: float, stiffness: float) -> SceneConfig:
-    """Refine the mesh by ``factor`` with equal mass, and multiply all weights by ``stiffness``."""
+def sized(config: SceneConfig, factor: float) -> SceneConfig:
+    """Refine the mesh of ``config`` by ``factor``, with equal mass."""
     finer = config.coarsened(factor, 1.0)
     counts = [c.mesh.build(Path()).vertices for c in (config, finer)]
-    effects = tuple(
-        e.model_copy(update={"weight": stiffness * e.weight}) if isinstance(e, GroupConfig) else e
-        for e in finer.effects
-    )
     mass = config.vertex_mass * counts[0] / counts[1]
-    return finer.model_copy(update={"vertex_mass": mass, "effects": effects})
+    return finer.model_copy(update={"vertex_mass": mass})
 
 
 def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[dict[str, Any]]:

@@ -1,1 +1,1 @@
-"""Hard cases: scenes with extreme input, and properties that every run of them must have."""
+"""Hard cases: scenes with extreme input, and how reductions fare in them."""

@@ -1,23 +1,22 @@
 """Outcomes of reductions in hard cases (scenes with extreme input), and the expected outcomes."""
 
 import logging
-from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from pdrom.core.errors import NotReducibleError, PdromError, choices
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import ConstraintGroup
-from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.effects import EFFECTS
 from pdrom.reduction.basis import Basis, group_basis
 from pdrom.reduction.method import MethodSpec
+from pdrom.reduction.rerun import Rerun, rerun
 from pdrom.reduction.sampling import Reduction, select
 from pdrom.reduction.sampling.model import ProjectionModel
 from pdrom.reduction.snapshots import recorded
@@ -27,18 +26,18 @@ from pdrom.reduction.subspace.space import reduced_state
 from pdrom.reduction.subspace.training import make_columns, sampled_models
 from study.artifact.paths import HARD_CASES, File
 from study.artifact.reads import ProjectFile, Setting
-from study.experiments.hard_cases import record
-from study.experiments.hard_cases.catalogue import CASES, MESHES, reducible_cases
+from study.experiments.hard_cases.catalogue import FILES, LIST, HardCase, cases, start_of
 from study.experiments.kit.base import experiment
 
 HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"
-FAILURES = ("refused", "singular", "blow-up", "distorted", "objective rises", "momentum changes")
+FAILURES = ("refused", "singular", "blow-up", "distorted")
 R, K, TOLERANCE = 10, 6, 1e-2
 HRPD = HrpdSpec(dimension=20, samples=60)
 BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
 # Longest sides of a run's bounding box, as multiples of `Training.extent`: above the first, the run
 # blew up; above the second, it is distorted.
 BLOWUP, DISTORTED = 100.0, 3.0
+Model = SubspaceModel | ProjectionModel
 # Kinds of constraint manifolds on which the norm of projections is bounded, whatever the state.
 BOUNDED = ("clamped", "length", "half sphere")
 Methods = Mapping[str, MethodSpec]
@@ -49,14 +48,13 @@ COLUMNS = [
 ]  # fmt: skip
 
 
-def _known(case: str, cases: Collection[str]) -> str:
-    if case not in cases:
-        raise ValueError(f"unknown case {shown(case, 60)}{choices(case, cases)}")
+def _known(case: str) -> str:
+    if case not in cases():
+        raise ValueError(f"unknown case {shown(case, 60)}{choices(case, cases())}")
     return case
 
 
-Cases = tuple[Annotated[str, AfterValidator(lambda case: _known(case, CASES))], ...]
-ReducibleCase = Annotated[str, AfterValidator(lambda case: _known(case, reducible_cases()))]
+Cases = tuple[Annotated[str, AfterValidator(_known)], ...]
 
 
 class Expectation(ConfigModel):
@@ -70,30 +68,21 @@ class Expectation(ConfigModel):
     fails: Cases = ()
     may_fail: Cases = ()
 
-    @model_validator(mode="after")
-    def _listed_once(self) -> Self:
-        for case, times in Counter((*self.fails, *self.may_fail)).items():
-            if times > 1:
-                raise ValueError(f"case '{case}' is listed twice")
-        return self
-
 
 class Training:
     """Full-order run of a hard case, with snapshots of its first group, which is reduced.
 
     positions : (F + 1, N, 3) m, initial positions first
-    extent : longest side (m) of the bounding boxes of all frames, rest shape and fixed vertices
+    extent : longest side (m) of the bounding boxes of all frames and of the rest shape
     """
 
-    def __init__(self, case: record.HardCase) -> None:
-        self.case, self.scene = case, case.scene()
+    def __init__(self, case: HardCase) -> None:
+        self.scene = case.scene()
         self.group: ConstraintGroup = self.scene.groups[0]
-        self.start = case.start(self.scene)
+        self.start = start_of(self.scene, **case.start)
         self.positions, p, roundoff = recorded(self.scene, self.group.name, self.start)
         self._snapshots = p[::2], float(np.linalg.norm(roundoff[::2]))
-        self.extent = max(
-            float(np.ptp(self.positions, axis=1).max()), record.reach(self.scene, self.positions)
-        )
+        self.extent = max(self.scene.mesh.extent, float(np.ptp(self.positions, axis=1).max()))
 
     def basis(self, spec: MethodSpec) -> Basis:
         """Return the basis of the snapshots, with the centring, weights etc. of ``spec``."""
@@ -106,9 +95,7 @@ def names(methods: Methods) -> list[str]:
     return [*methods, *(f"{basis}-{sampling}" for basis in BASES for sampling in BASES[basis])]
 
 
-def reduced_model(
-    training: Training, name: str, methods: Methods
-) -> SubspaceModel | ProjectionModel | None:
+def reduced_model(training: Training, name: str, methods: Methods) -> Model | None:
     """Train the reduction ``name``; None if the projections are round-off, so that no mode is left.
 
     In a name such as "pod-ecsw", "full" evaluates all projections, "ecsw" only those of some
@@ -136,35 +123,13 @@ def reduced_model(
     return SubspaceModel(columns)
 
 
-def reduced_run(training: Training, model: SubspaceModel | ProjectionModel) -> record.Record:
+def reduced_run(training: Training, model: Model) -> Rerun:
     """Run the hard case with ``model``; it ends if its box exceeds `BLOWUP` times the full one."""
-    loop, _ = model.loop(training.scene)
-    limit = BLOWUP * training.extent
-    if isinstance(model, ProjectionModel):
-        return record.record(training.scene, loop, training.start, limit=limit)
-    h, iterations = loop.time_step, loop.iterations
-    tracked = Stepper(loop.space, h, iterations, local_steps=loop.local_steps)
-    start = reduced_state(training.scene, model.columns, training.start)
-    return record.record(training.scene, tracked, start, model, limit)
-
-
-def outcome(training: Training, model: SubspaceModel | ProjectionModel, run: record.Record) -> str:
-    """Return the first failure of the ``run`` with ``model``, `HOLDS` if there is none."""
-    if isinstance(model, ProjectionModel) and model.reduction.gain == np.inf:
-        return "singular"
-    if run.blowup_frame is not None:
-        return "blow-up"
-    if run.extent > DISTORTED * training.extent:
-        return "distorted"
-    # In a position subspace, the objective must fall in every iteration, as in full order. With
-    # unreduced positions and interpolated projections it may rise.
-    if isinstance(model, SubspaceModel) and run.excess.max() > 0.0:
-        return "objective rises"
-    # internal forces S^T W p sum to zero for any projections p: reduction keeps the momentum
-    free = "momentum" in training.case.holds
-    if free and not record.keeps_momentum(training.scene, run):
-        return "momentum changes"
-    return HOLDS
+    scene, start = training.scene, training.start
+    if isinstance(model, SubspaceModel):
+        start = reduced_state(scene, model.columns, start)
+    limit = BLOWUP * training.extent / scene.mesh.extent
+    return rerun(scene, model.loop(scene)[0], start, None, limit, model.positions)
 
 
 def row(
@@ -185,59 +150,66 @@ def row(
         sizes = {"r": model.reduction.r, "gain": model.reduction.gain}
     else:
         sizes = {"k": model.columns.B.shape[1], "r": model.elements_evaluated(training.scene)}
-    found, entry = outcome(training, model, run), expected.get(name)
+    extent = float(np.ptp(run.positions, axis=1).max()) / training.extent
+    outcome = HOLDS
+    if sizes.get("gain") == np.inf:
+        outcome = "singular"
+    elif not run.finite:
+        outcome = "blow-up"
+    elif extent > DISTORTED:
+        outcome = "distorted"
     return {
         **sizes,
-        "frames": len(run.positions) - 1,
-        "finite": run.blowup_frame is None,
+        "frames": run.frames,
+        "finite": run.finite,
         "blowup_frame": run.blowup_frame,
-        "max_extent": run.extent / training.extent,
-        "outcome": found,
-        "why": entry.why if entry and found in FAILURES else "",
+        "max_extent": extent,
+        "outcome": outcome,
+        "why": expected[name].why if name in expected and outcome != HOLDS else "",
     }
 
 
 class HardCases(ConfigModel):
     """Section ``hard_cases`` of the configuration.
 
-    cases : names of the hard cases that are run; without names, all that are not slow
+    cases : names of the hard cases that are run; without names, all
     expected : reduction -> its expected failures; a reduction without an entry must never fail
     """
 
-    cases: tuple[ReducibleCase, ...] = ()
+    cases: Cases = ()
     expected: dict[str, Expectation] = Field(default_factory=dict)
 
     @property
     def modules(self) -> list[str]:
         """Classes ("module:attribute") of the hard cases' effects, for the job's fingerprint."""
-        chosen = self.cases or reducible_cases()
-        effects = {effect["effect"] for name in chosen for effect in CASES[name].effects}
+        chosen = self.cases or cases()
+        effects = {effect["effect"] for name in chosen for effect in cases()[name].effects}
         return sorted(EFFECTS[effect] for effect in effects)
 
 
 @experiment(
     "Hard cases of every reduction",
     reads={
-        "meshes": ProjectFile(tuple(f"config/scenes/meshes/{name}" for name in MESHES)),
+        "listed": ProjectFile(tuple(f"config/{name}" for name in (LIST, *FILES))),
         "every_method": Setting("every_method"),
         "asked": Setting("hard_cases"),
     },
-    writes={"cases": HARD_CASES},
+    writes={"out": HARD_CASES},
 )
 def hard_cases(
-    meshes: list[Path], every_method: dict[str, MethodSpec], asked: HardCases, cases: File
+    listed: list[Path], every_method: dict[str, MethodSpec], asked: HardCases, out: File
 ) -> None:
     """Run hard cases with every reduction.
 
-    ``meshes`` only declares inputs of the job: the hard cases read these files themselves.
+    ``listed`` only declares inputs of the job: the hard cases read these files themselves.
     """
     found = []
-    for name in asked.cases or reducible_cases():
-        training = Training(CASES[name])
+    for name in asked.cases or cases():
+        training = Training(cases()[name])
         bounded = training.group.manifold in BOUNDED
         for method in names(every_method):
             own = row(training, method, every_method, asked.expected)
             found.append({"case": name, "method": method, "bounded_projections": bounded, **own})
         log.info("%s: done", name)
     whole = dict.fromkeys(["k", "r", "frames", "blowup_frame"], "Int64")
-    write_table(pd.DataFrame(found, columns=COLUMNS).astype(whole), cases.path)
+    write_table(pd.DataFrame(found, columns=COLUMNS).astype(whole), out.path)

@@ -32,14 +32,13 @@ class Protocol(ConfigModel):
 
     frames: Count = 10
     warmup: Annotated[int, Field(ge=0, le=1000)] = 1
-    repeats: Repeats = 5
+    repeats: Repeats = 3
 
 
 class Processes(Protocol):
     """Settings of a timing done in each of ``processes`` new processes, one after the other."""
 
     frames: Count = 4
-    repeats: Repeats = 3
     processes: Repeats = 10
 
 

@@ -9,7 +9,7 @@ from pdrom.model.held_out import FASTER, MOTIONS, TILTS
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene
 from places import ROOT
-from study.experiments.kit.runfiles import run_error
+from study.experiments.references import run_error
 from study.pipeline.scenes import read_scene
 
 SCENES = [path.stem for path in sorted((ROOT / "config" / "scenes").glob("*.yaml"))]

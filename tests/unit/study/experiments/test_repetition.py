@@ -18,8 +18,9 @@ from pdrom.reduction.method import MethodSpec, load_methods
 from pdrom.reduction.sampling import Reduction, reductions, select
 from pdrom.reduction.snapshots import SnapshotSet, recorded
 from places import ROOT
-from study.experiments import repetitions as module
-from study.experiments.repetitions import LadderSection, ReducedRuns, Repetitions, drawn
+from study.experiments.repetitions import noise as module
+from study.experiments.repetitions.ladder import LadderSection
+from study.experiments.repetitions.runs import TRAINED_ON, ReducedRuns, Repetitions, drawn
 from study.figures.kit.read import rerun_infos
 from study.pipeline.scenes import Coarsen, load_bound_scene
 
@@ -65,24 +66,24 @@ def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
     scene, reference, data = sheet
     whole = ReducedRuns("spring", data, Yardstick(scene, reference), END)
     (reduction,) = reductions(whole.basis(BLOCK), BLOCK, [3]).values()
-    one, other = whole.run(reduction), short.run(reduction)
-    assert (one.frames, other.frames) == (12, END)
-    assert whole.error(one) == short.error(other)
+    (row, one), (other, _) = whole.run(reduction), short.run(reduction)
+    assert (row["frames"], other["frames"]) == (12, END)
+    assert row["error"] == other["error"]
     moved = np.linalg.norm(reference[1 : END + 1] - reference[0])
     expected = np.linalg.norm(one.positions[1 : END + 1] - reference[1 : END + 1]) / moved
-    assert whole.error(one) == pytest.approx(expected, rel=1e-9)
+    assert row["error"] == pytest.approx(expected, rel=1e-9)
 
 
 def test_bases_of_several_motions_are_run_on_the_held_out_ones(sheet):
     scene, reference, data = sheet
     runs = ReducedRuns("spring", data, Yardstick(scene, reference), END)
-    rows = list(runs.on_motions(BLOCK, [3], [1, 2]))
-    trained = [f"held out, {count} trained" for count in (1, 2)]
+    rows = list(runs.on_motions(BLOCK, [3]))
+    trained = [f"held out, {count} trained" for count in TRAINED_ON]
     assert [row["varied"] for row in rows] == np.repeat(trained, len(MOTIONS)).tolist()
     other = Scene.build(scene.config.heldout_variant(MOTIONS[1]), scene.mesh)
     held = replace(runs, full=Yardstick(other, trajectory(other)))
     (reduction,) = reductions(runs.basis(BLOCK), BLOCK, [3]).values()
-    assert rows[1]["error"] == held.error(held.run(reduction))
+    assert rows[1]["error"] == held.run(reduction)[0]["error"]
     assert rows[0]["gain"] == reduction.gain != rows[-1]["gain"]
     positions, projections, _ = recorded(other, "spring", other.initial_state())
     np.testing.assert_array_equal(positions, held.full.reference)

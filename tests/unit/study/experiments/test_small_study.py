@@ -26,8 +26,9 @@ from study.artifact.paths import File, Place
 from study.experiments.iterations import iterations
 from study.experiments.kit.base import Experiment
 from study.experiments.references import ConvergedStepper, Reference, references
-from study.experiments.repetitions import LadderSection, Options, repetitions
-from study.experiments.reruns import ShortRuns, stability
+from study.experiments.repetitions.experiment import Options, repetitions
+from study.experiments.repetitions.ladder import LadderSection
+from study.experiments.stability import ShortRuns, stability
 from study.pipeline.folders import Folders
 from study.pipeline.plan import Plan
 from study.pipeline.study import Study
@@ -262,8 +263,8 @@ def test_the_sweep_ends_at_the_horizon_and_with_runs_that_did_not_converge(again
 
 def test_every_setting_holds_every_model_once(again, monkeypatch):
     """(h, ratio): own, other h, other ratio; full order, two methods at two sizes, two models."""
-    monkeypatch.setattr("study.experiments.reruns.FEWEST", 4)
-    monkeypatch.setattr("study.experiments.reruns.MOST", 6)
+    monkeypatch.setattr("study.experiments.stability.FEWEST", 4)
+    monkeypatch.setattr("study.experiments.stability.MOST", 6)
     asked = ShortRuns(time_steps=(0.1,), stiffness_ratios=(0.01,), ranks=(2, 30), duration=0.08)
     short_runs = again(stability, short=asked)["out"]
     keys = ["h", "stiffness_ratio", "method", "position_basis", "r"]

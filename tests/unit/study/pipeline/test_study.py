@@ -9,7 +9,7 @@ from pdrom.core.yamlfile import read_yaml, validate
 from places import CONFIG, ROOT
 from study.artifact import paths
 from study.experiments.kit.base import experiments
-from study.experiments.reruns import stability
+from study.experiments.stability import stability
 from study.pipeline.plan import Plan, check_live, check_subspaces
 from study.pipeline.study import Study, StudySettings, labels_of
 

@@ -17,7 +17,7 @@ from pdrom.model.mesh.types import Mesh, load_mesh, save_mesh
 from pdrom.model.runs import trajectory
 from pdrom.model.scene import Scene, SceneConfig
 from strategies import cells, wild_meshes
-from study.experiments.hard_cases.record import build
+from study.experiments.hard_cases.catalogue import build
 
 
 def test_cloth_has_the_counts_of_the_study():

@@ -16,7 +16,7 @@ from pdrom.reduction.sampling import Reduction, Sampling, select, select_path
 from pdrom.reduction.sampling.reduction import norm_and_condition, solution_operator
 from places import CONFIG
 from strategies import SEEDS
-from study.experiments.kit.runfiles import load_reduction
+from study.experiments.kit.models import load_reduction
 
 ELEMENTS, P = 14, 2
 ROWS = ELEMENTS * P

@@ -1,0 +1,51 @@
+"""A run of a reduced model: its table row, and what is stored of it."""
+
+from typing import Any
+
+import h5py
+import numpy as np
+
+from pdrom.model.energy import largest
+from pdrom.reduction.deviations import Reduced, Yardstick
+from pdrom.reduction.rerun import Rerun
+
+Row = dict[str, Any]
+
+
+def run(
+    full: Yardstick, model: Reduced, labels: Row, offset: np.ndarray | None = None
+) -> tuple[Row, Rerun]:
+    """Run ``model`` in the scene of ``full``; return the row (``labels``, results) and the run.
+
+    Initial positions are displaced by ``offset`` (N, 3) m.
+    """
+    outcome = full.run(model, offset)
+    return labels | full.row(outcome), outcome
+
+
+def store_series(
+    store: h5py.Group, full: Yardstick, outcome: Rerun, **series: np.ndarray
+) -> float | None:
+    """Store the deviations of a run from ``full``, and further ``series`` of its frames.
+
+    Return its largest energy relative to the full-order run; None if that is round-off.
+    """
+    apart = full.deviations(outcome)
+    for name, values in {**apart, **series}.items():
+        store[name] = values
+    return largest(apart["energy"])
+
+
+def store_end(
+    store: h5py.Group, outcome: Rerun | None, r: int, with_positions: bool = True
+) -> None:
+    """Store the size r of a run, how it ended and, if asked, positions in single precision.
+
+    The attribute ``marked`` tells that the basis has fewer than r modes, so that nothing ran.
+    """
+    store.attrs.update(r=r, marked=outcome is None)
+    if outcome is not None:
+        blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
+        store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
+        if with_positions:
+            store["positions"] = outcome.positions.astype(np.float32)

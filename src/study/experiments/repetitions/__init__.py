@@ -1,0 +1,1 @@
+"""Reduced runs: repeated, with one choice changed, or with bases computed from rounding errors."""
