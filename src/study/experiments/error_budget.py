@@ -22,7 +22,6 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit import base as kit
-from study.experiments.kit.base import experiment
 from study.experiments.references import converged_positions
 
 log = logging.getLogger(__name__)
@@ -50,7 +49,7 @@ class Budget(ConfigModel):
     skinning: tuple[SceneName, ...] = ()
 
 
-@experiment(
+@kit.experiment(
     "Error budget of {scene}",
     reads={
         "mesh": paths.MESH,

@@ -25,7 +25,6 @@ from pdrom.reduction.settings import (
 from study.artifact import paths
 from study.artifact.reads import Setting as Configured
 from study.experiments.kit import base as kit
-from study.experiments.kit.base import experiment
 from study.experiments.references import converged_positions
 
 COLUMNS = [
@@ -50,7 +49,7 @@ class IterationCounts(ConfigModel):
     coarser: kit.Parts = kit.PARTS
 
 
-@experiment(
+@kit.experiment(
     "Accuracy of {scene} against the number of iterations",
     reads={
         "mesh": paths.MESH,

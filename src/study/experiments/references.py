@@ -22,7 +22,6 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit import base as kit
-from study.experiments.kit.base import experiment
 
 log = logging.getLogger(__name__)
 
@@ -47,7 +46,7 @@ class Reference(ConfigModel):
     limit: Annotated[int, Field(ge=2)] = 20_000
 
 
-@experiment(
+@kit.experiment(
     "Converged runs of {scene}",
     reads={
         "mesh": paths.MESH,

@@ -21,7 +21,6 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Settings
 from study.experiments.kit import base as kit
-from study.experiments.kit.base import experiment
 from study.experiments.kit.runs import Row, run, store_end, store_series
 from study.experiments.references import converged_positions
 
@@ -53,7 +52,7 @@ class Options(ConfigModel):
     ranks: tuple[kit.Rank, ...]
 
 
-@experiment(
+@kit.experiment(
     "Sampling and reruns of {scene}, {group} by {method}",
     reads={
         "mesh": paths.MESH,

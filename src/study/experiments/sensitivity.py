@@ -23,7 +23,6 @@ from pdrom.reduction.rerun import mean_motion
 from study.artifact.paths import CONTRIBUTIONS, FULL_ORDER, MESH, SENSITIVITY, File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit import base as kit
-from study.experiments.kit.base import experiment
 
 Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
 EFFECTS = ["scene", "effect", "role", "frame", "force", "energy"]
@@ -56,7 +55,7 @@ class Sensitivity(PerturbedRuns):
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1e-3
 
 
-@experiment(
+@kit.experiment(
     "Perturbed full-order runs of {scene}",
     reads={
         "mesh": MESH,

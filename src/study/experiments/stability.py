@@ -18,7 +18,6 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting
 from study.experiments.kit import base as kit
-from study.experiments.kit.base import experiment
 from study.experiments.kit.models import Methods, Model, stored_models
 from study.experiments.kit.runs import Row, run
 
@@ -64,7 +63,7 @@ class Stability(ShortRuns):
     left: Annotated[float, Field(gt=1.0)] = 2.0
 
 
-@experiment(
+@kit.experiment(
     "Time step and stiffness of {scene}",
     reads={
         "mesh": paths.MESH,

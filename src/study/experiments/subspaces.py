@@ -34,7 +34,6 @@ from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import EachOf, Every, Setting, Settings, SourcesOf
 from study.experiments.kit import base as kit
-from study.experiments.kit.base import experiment
 from study.experiments.kit.models import load_reduction
 from study.experiments.kit.runs import Row, run, store_series
 from study.experiments.references import converged_positions, run_error
@@ -104,7 +103,7 @@ class Online(LargeModels):
     scenes: tuple[str, ...] = ()
 
 
-@experiment(
+@kit.experiment(
     "Position subspaces of {scene}, with full and with sampled projections",
     reads={
         "mesh": paths.MESH,
@@ -148,7 +147,7 @@ def subspaces(
     write_table(train[SECONDS_COLUMNS], files["seconds_table"].path)
 
 
-@experiment(
+@kit.experiment(
     "Reduction of {scene}",
     reads={
         "sources": SourcesOf("scene.mesh"),
@@ -291,7 +290,7 @@ class Options(ConfigModel):
     joint_rows: tuple[JointRows, ...]
 
 
-@experiment(
+@kit.experiment(
     "Models of {scene} for the page",
     reads={
         "mesh": paths.MESH,

@@ -34,7 +34,6 @@ from study.artifact.reads import Every, Settings, SourcesOf
 from study.experiments.iterations import IterationCounts
 from study.experiments.iterations import settings as full_order_settings
 from study.experiments.kit import base as kit
-from study.experiments.kit.base import experiment
 from study.experiments.kit.costs import effect_costs, left_out, local_costs, variant
 from study.experiments.kit.measurement import Protocol
 from study.experiments.kit.models import stored_models
@@ -133,7 +132,7 @@ class Options(ConfigModel):
     timing: Timing
 
 
-@experiment(
+@kit.experiment(
     "Timings of {scene}",
     reads={
         "mesh": paths.MESH,
@@ -254,7 +253,7 @@ class SizedOptions(ConfigModel):
     scaling: Sized
 
 
-@experiment(
+@kit.experiment(
     "Cost of {scene} on a mesh with {factor} times the vertices along a side",
     reads={"sources": SourcesOf("scene.mesh"), "settings": Settings(SizedOptions)},
     writes={"iterations": paths.SCALING, "breakeven": paths.BREAK_EVEN_SIZED},

@@ -7,8 +7,9 @@ Where reduced models are chosen, they and all others run validation motions, too
 
 import logging
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import product
 from pathlib import Path
 from time import process_time
 from typing import Annotated, Any, Final, Literal, NamedTuple
@@ -31,7 +32,6 @@ from pdrom.reduction.settings import (
     PLAIN,
     Setting,
     Starts,
-    full_order,
     loop_of,
 )
 from pdrom.reduction.subspace.model import SubspaceModel, reduced
@@ -47,8 +47,8 @@ from study.experiments.alternatives.solvers import (
     measured_rate,
 )
 from study.experiments.kit import base as kit
-from study.experiments.kit.base import experiment
 from study.experiments.kit.measurement import Processes, in_processes
+from study.experiments.kit.runs import Row
 
 SAMPLED, NEWTON = REDUCTIONS = "ecsw", "ecsw-newton"  # names of the reduced methods
 TWO_LEVEL: Final = "two-level"  # full-order method whose coarse level is a trained subspace
@@ -178,7 +178,7 @@ class Trained(NamedTuple):
     iterations : method -> numbers of iterations; None: converged
     """
 
-    labels: dict[str, object]
+    labels: Row
     model: SubspaceModel
     iterations: Mapping[str, Sequence[int | None]]
 
@@ -187,7 +187,7 @@ class Trained(NamedTuple):
 class Case:
     """A scene with one motion, its coarser meshes, its models, and the settings to compare."""
 
-    labels: dict[str, object]
+    labels: Row
     scene: Scene
     coarser: tuple[Coarser, ...]
     models: tuple[Trained, ...]
@@ -207,15 +207,16 @@ class Case:
 
     def _full_order(self) -> Iterator[Setting]:
         for method, window in ACCELERATED.items():
-            pairs = self._pairs(method)
-            once = [(count, window) for substeps, count in pairs if substeps == 1]
-            meshes: tuple[Coarser | None, ...] = self.coarser if method in COARSE else (None,)
-            for own in full_order(self.scene, once, meshes):
-                yield replace(own, labels={**own.labels, "substeps": 1})
-            for substeps, count in pairs if method not in COARSE else ():
-                if substeps > 1:
-                    scene = substepped(self.scene, substeps).iterated(count, window)
-                    yield loop_of(self._labels(method, substeps, count), scene, steps=substeps)
+            coarse = method in COARSE
+            meshes: tuple[Coarser | None, ...] = self.coarser if coarse else (None,)
+            for mesh, (substeps, count) in product(meshes, self._pairs(method)):
+                own = self.scene if mesh is None else mesh.scene
+                labels = self._labels(method, substeps, count) | {"vertices": own.mesh.vertices}
+                if substeps == 1:
+                    yield loop_of(labels, own.iterated(count, window), mesh)
+                elif not coarse:
+                    split = substepped(own, substeps).iterated(count, window)
+                    yield loop_of(labels, split, steps=substeps)
         scene, start = self.scene, self.scene.initial_state()
         for method in ("chebyshev", "chebyshev-power"):
             for _, count in self._pairs(method):
@@ -231,7 +232,7 @@ class Case:
     def _pairs(self, method: str) -> list[tuple[int, int]]:
         return self.section.pairs(method, self.scene.mesh.vertices)
 
-    def _labels(self, method: str, substeps: int, iterations: int) -> dict[str, object]:
+    def _labels(self, method: str, substeps: int, iterations: int) -> Row:
         vertices = self.scene.mesh.vertices
         labels = {"method": method, "vertices": vertices, "substeps": substeps}
         return {**labels, "iterations": iterations}
@@ -286,16 +287,16 @@ def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
             started = process_time()
             columns = make_columns([training], frames, modes, skinning)
             own = [model for model in asked if model.columns == (modes, skinning)]
-            runs = [(model.tolerance, model.runs) for model in own]
+            trials = [(each.tolerance, each.runs) for each in own]
             if count == 1 and section.steps.get(TWO_LEVEL) and own[0] is section.models[0]:
                 few = [own for _, own in section.pairs(TWO_LEVEL, vertices)]
-                runs.append((COARSE_TAU, {TWO_LEVEL: few}))
-            tolerances = [tolerance for tolerance, _ in runs]
+                trials.append((COARSE_TAU, {TWO_LEVEL: few}))
+            tolerances = [tolerance for tolerance, _ in trials]
             made = sampled_models(scenes, columns, np.arange(len(runs[0])), tolerances)
             seconds = spent + process_time() - started
             log.info("%d motions, %d + %d columns: %.0f s", count, modes, skinning, seconds)
-            for (tolerance, iterations), model in zip(runs, made, strict=True):
-                labels: dict[str, object] = {
+            for (tolerance, iterations), model in zip(trials, made, strict=True):
+                labels: Row = {
                     "vertices": vertices, "training_motions": count, "k": columns.modes,
                     "skinning": skinning, "tolerance": tolerance, "offline_s": seconds,
                     "elements_sampled": model.elements_evaluated(training),
@@ -314,7 +315,7 @@ def substepped(scene: Scene, substeps: int) -> Scene:
     )
 
 
-@experiment(
+@kit.experiment(
     "Alternatives to projective dynamics in {scene} with {factor} times the vertices along a side",
     reads={
         "sources": SourcesOf("scene.mesh"),
@@ -359,7 +360,7 @@ def sized(config: SceneConfig, factor: float) -> SceneConfig:
     return finer.model_copy(update={"vertex_mass": mass})
 
 
-def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[dict[str, Any]]:
+def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[Row]:
     """Yield rows with errors of runs in the motion of ``case``, one row for each run.
 
     The first are the converged implicit step on all meshes and the ``recorded`` training motion,
@@ -369,7 +370,7 @@ def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[dict[str, An
     """
     scene, section = case.scene, case.section
     frames, implicit = scene.config.frames, None
-    common: dict[str, Any] = {"frames": frames}
+    common: Row = {"frames": frames}
     tolerance = section.implicit.tolerance
     if section.affords(CONVERGED, scene.mesh.vertices):
         implicit = converged_run(scene, tolerance, MOST)
@@ -379,7 +380,7 @@ def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[dict[str, An
     if truth is not None and test:
         common |= _own_errors(truth, tolerance / section.implicit.finer)
 
-    def errors(run: np.ndarray | None) -> dict[str, float | None]:
+    def errors(run: np.ndarray | None) -> Row:
         found = (None, None) if run is None or truth is None else truth.errors(run, frames)
         return dict(zip(("error_implicit", "deformation_error"), found, strict=True))
 
@@ -395,7 +396,7 @@ def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[dict[str, An
         yield {**common, **setting.labels, "finite": reached is not None, **errors(reached)}
 
 
-def _own_errors(truth: Yardstick, tolerance: float) -> dict[str, float | None]:
+def _own_errors(truth: Yardstick, tolerance: float) -> Row:
     """Errors of the converged run against a finer one, on sheets from other starting points."""
     scene, frames = truth.scene, truth.scene.config.frames
     finer = converged_run(scene, tolerance, MOST, from_last=not len(scene.mesh.tetrahedra))

@@ -13,6 +13,7 @@ from pdrom.core.errors import NotReducibleError, PdromError, choices
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import ConstraintGroup
+from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.effects import EFFECTS
 from pdrom.reduction.basis import Basis, group_basis
 from pdrom.reduction.method import MethodSpec
@@ -125,11 +126,12 @@ def reduced_model(training: Training, name: str, methods: Methods) -> Model | No
 
 def reduced_run(training: Training, model: Model) -> Rerun:
     """Run the hard case with ``model``; it ends if its box exceeds `BLOWUP` times the full one."""
-    scene, start = training.scene, training.start
+    scene, start, (loop, _) = training.scene, training.start, model.loop(training.scene)
     if isinstance(model, SubspaceModel):
         start = reduced_state(scene, model.columns, start)
+        loop = Stepper(loop.space, loop.time_step, loop.iterations, loop.local_steps, False)
     limit = BLOWUP * training.extent / scene.mesh.extent
-    return rerun(scene, model.loop(scene)[0], start, None, limit, model.positions)
+    return rerun(scene, loop, start, None, limit, model.positions)
 
 
 def row(

@@ -16,7 +16,6 @@ from pdrom.reduction.method import MethodSpec
 from study.artifact import paths
 from study.artifact.reads import Settings
 from study.experiments.kit import base as kit
-from study.experiments.kit.base import experiment
 from study.experiments.kit.runs import Row
 from study.experiments.repetitions import ladder, noise
 from study.experiments.repetitions.runs import ReducedRuns, Repetitions, Varied
@@ -70,7 +69,7 @@ class Options(ConfigModel):
     horizon: kit.Horizon
 
 
-@experiment(
+@kit.experiment(
     "Repeated runs of {scene}, {group} reduced",
     reads={
         "mesh": paths.MESH,

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from builders import GRAVITY, GROUPS, LEFT, make_scene
-from pdrom.core.errors import SceneError
 from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs import ConvergedStepper, converged_run, followed
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
@@ -67,22 +66,6 @@ def test_the_rate_is_that_at_which_plain_iterations_approach_their_limit(weight)
     assert measured_rate(scene) == pytest.approx(misses[1] / misses[0], rel=0.02)
 
 
-@pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
-def test_a_free_body_gains_the_momentum_of_gravity_only_and_the_same_bits_again(group, rng):
-    scene = small(group, GRAVITY, weight=1e4)
-    start, ends = crumpled(scene, rng), []
-    for _ in range(2):
-        loop, state = Chebyshev(scene, 3), start
-        for frame in range(3):
-            state, _ = loop.step(state, frame)
-        ends.append(state)
-    momentum = scene.masses @ (state.velocities - start.velocities)
-    expected = scene.masses.sum() * 3 * scene.config.time_step * np.array([0.0, -9.81, 0.0])
-    np.testing.assert_allclose(momentum, expected, rtol=0.0, atol=1e-8 * np.abs(expected).max())
-    assert ends[0].positions.tobytes() == ends[1].positions.tobytes()
-    assert ends[0].velocities.tobytes() == ends[1].velocities.tobytes()
-
-
 def test_substeps_approach_one_motion():
     """A method of first order: what quartering the step changes falls to a quarter."""
     scene, ends = small("spring", *HELD, weight=1e4), []
@@ -105,15 +88,6 @@ def test_handles_and_floor_act_as_in_the_step_loop():
         speed = 0.1 / scene.config.time_step
         np.testing.assert_allclose(state.velocities[held, 1], speed, rtol=1e-9)
     assert (state.positions[:, 1] >= 2.0).all()
-
-
-def test_forces_groups_and_methods_are_refused_by_name():
-    windy = small("spring", {"effect": "drag", "coefficient": 0.1})
-    with pytest.raises(SceneError, match="'drag': method 'chebyshev' takes no force but gravity"):
-        Chebyshev(windy, 1)
-    both = make_scene(*HELD, *({"effect": name, "weight": 1e5} for name in ("spring", "strain")))
-    with pytest.raises(SceneError, match="'two-level' takes one group"):
-        TwoLevel(both, 1, model_of(small("spring", *HELD, frames=8), 2))
 
 
 def model_of(scene, modes: int, elements: np.ndarray | None = None) -> SubspaceModel:
