@@ -63,15 +63,9 @@ class Budget(ConfigModel):
     writes={"out": paths.ERROR_BUDGET},
 )
 def error_budget(
-    mesh: File,
-    sensitivity: File,
-    full_order: list[File],
-    converged: list[File],
-    config: SceneConfig,
-    asked: Budget,
-    horizon: kit.Horizon,
-    out: File,
-) -> None:
+    mesh: File, sensitivity: File, full_order: list[File], converged: list[File],
+    config: SceneConfig, asked: Budget, horizon: kit.Horizon, out: File,
+) -> None:  # fmt: skip
     """Run every test trajectory of a scene with each simplification, until its horizon.
 
     Without a converged run there are no rows.

@@ -62,12 +62,9 @@ class IterationCounts(ConfigModel):
     writes={"out": paths.ITERATIONS},
 )
 def iterations(
-    config: SceneConfig,
-    asked: IterationCounts,
-    horizon: kit.Horizon,
-    out: paths.File,
+    config: SceneConfig, asked: IterationCounts, horizon: kit.Horizon, out: paths.File,
     **files: paths.File,
-) -> None:
+) -> None:  # fmt: skip
     """Run a scene with every setting until its horizon; write errors against the converged run.
 
     They are empty without such a run. The own setting has the error of the mesh, too.

@@ -65,15 +65,9 @@ class Reference(ConfigModel):
     },
 )
 def references(
-    mesh: File,
-    sensitivity: File,
-    full_order: list[File],
-    config: SceneConfig,
-    asked: Reference,
-    horizon: kit.Horizon,
-    out: File,
-    **runs: File,
-) -> None:
+    mesh: File, sensitivity: File, full_order: list[File], config: SceneConfig,
+    asked: Reference, horizon: kit.Horizon, out: File, **runs: File,
+) -> None:  # fmt: skip
     """Run all motions of a scene to convergence, each into one of ``runs``; errors go to ``out``.
 
     The error of such a run is its difference, before the horizon, from a second one with a

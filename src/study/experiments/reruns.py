@@ -97,12 +97,9 @@ def reruns(motions: list[File], converged: list[File], settings: Options, **file
 
 
 def _runs(
-    yardstick: Yardstick,
-    labels: Row,
-    sampled: dict[int, Reduction | None],
-    rank: int,
+    yardstick: Yardstick, labels: Row, sampled: dict[int, Reduction | None], rank: int,
     file: h5py.Group,
-) -> Iterator[Row]:
+) -> Iterator[Row]:  # fmt: skip
     """Run a motion with every reduction, store the runs in ``file``, and yield their table rows.
 
     A size r above the rank is not run: its row has no results, its group is ``marked``. Positions

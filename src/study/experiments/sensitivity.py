@@ -24,7 +24,6 @@ from study.artifact.paths import CONTRIBUTIONS, FULL_ORDER, MESH, SENSITIVITY, F
 from study.artifact.reads import Every, Setting
 from study.experiments.kit import base as kit
 
-Perturbation = Annotated[float, Field(gt=0.0, lt=1.0)]
 EFFECTS = ["scene", "effect", "role", "frame", "force", "energy"]
 Row = tuple[str, str, int, float, float]
 COLUMNS = ["scene", "perturbation", "seed", "frame", "relative_difference"]
@@ -38,8 +37,8 @@ class PerturbedRuns(ConfigModel):
     ``reference`` is the one that decides the horizon, and with which held-out motions are run.
     """
 
-    perturbations: tuple[Perturbation, ...] = (1e-12, 1e-10, 1e-8)
-    reference: Perturbation = 1e-10
+    perturbations: tuple[kit.Tolerance, ...] = (1e-12, 1e-10, 1e-8)
+    reference: kit.Tolerance = 1e-10
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1)] = (1, 2, 3)
 
     @model_validator(mode="after")
@@ -66,13 +65,9 @@ class Sensitivity(PerturbedRuns):
     writes={"out": SENSITIVITY, "effects": CONTRIBUTIONS},
 )
 def sensitivity(
-    mesh: File,
-    full_order: list[File],
-    config: SceneConfig,
-    chosen: PerturbedRuns,
-    out: File,
+    mesh: File, full_order: list[File], config: SceneConfig, chosen: PerturbedRuns, out: File,
     effects: File,
-) -> None:
+) -> None:  # fmt: skip
     """Run a scene and its held-out motions from perturbed starts; also vary the scene's settings.
 
     Differences from unchanged runs go to ``out``, forces and energies of effects to ``effects``.

@@ -28,7 +28,6 @@ COLUMNS = [
     "energy_ratio", "gain", "group", "position_basis", "k", "frames", "relative_error",
 ]  # fmt: skip
 FEWEST, MOST = 30, 120  # limits of the number of frames of a short run
-Models = list[tuple[Row, Model | None]]
 
 
 class ShortRuns(ConfigModel):
@@ -77,13 +76,9 @@ class Stability(ShortRuns):
     writes={"out": paths.STABILITY},
 )
 def stability(
-    mesh: File,
-    config: SceneConfig,
-    methods: Methods,
-    short: ShortRuns,
-    out: File,
+    mesh: File, config: SceneConfig, methods: Methods, short: ShortRuns, out: File,
     **files: list[File],
-) -> None:
+) -> None:  # fmt: skip
     """Make full-order and reduced runs with each time step, then with each stiffness of `short`."""
     scene = kit.scene_of(config, mesh)
     given = files["samplings"], files["bases"], methods, short.ranks, files["subspaces"]
@@ -104,7 +99,7 @@ def stability(
     write_table(table.astype(dict.fromkeys(whole, "Int64")), out.path)
 
 
-def _rows(scene: Scene, models: Models) -> Iterator[Row]:
+def _rows(scene: Scene, models: list[tuple[Row, Model | None]]) -> Iterator[Row]:
     """Yield rows of the full-order run of ``scene`` and, if it is finite, of all reduced runs."""
     loop, start = scene.stepper(track_objective=False), scene.initial_state()
     whole = rerun(scene, loop, start, None, BLOWUP_EXTENT)

@@ -120,12 +120,9 @@ class Online(LargeModels):
     },
 )
 def subspaces(
-    full_order: list[File],
-    converged: list[File],
-    config: SceneConfig,
-    asked: SubspaceModels,
+    full_order: list[File], converged: list[File], config: SceneConfig, asked: SubspaceModels,
     **files: File,
-) -> None:
+) -> None:  # fmt: skip
     """Build a model for every basis, size and sampling, and run all motions with each."""
     motions = {
         run["run"]: Yardstick(

@@ -206,10 +206,11 @@ class Case:
                     yield reduced(labels, self.scene, model, asked, method == NEWTON)
 
     def _full_order(self) -> Iterator[Setting]:
+        vertices = self.scene.mesh.vertices
         for method, window in ACCELERATED.items():
             coarse = method in COARSE
             meshes: tuple[Coarser | None, ...] = self.coarser if coarse else (None,)
-            for mesh, (substeps, count) in product(meshes, self._pairs(method)):
+            for mesh, (substeps, count) in product(meshes, self.section.pairs(method, vertices)):
                 own = self.scene if mesh is None else mesh.scene
                 labels = self._labels(method, substeps, count) | {"vertices": own.mesh.vertices}
                 if substeps == 1:
@@ -219,7 +220,7 @@ class Case:
                     yield loop_of(labels, split, steps=substeps)
         scene, start = self.scene, self.scene.initial_state()
         for method in ("chebyshev", "chebyshev-power"):
-            for _, count in self._pairs(method):
+            for _, count in self.section.pairs(method, vertices):
                 loop = Chebyshev(scene, count)
                 if method != loop.name:
                     loop.rate = self._measured_rate
@@ -228,9 +229,6 @@ class Case:
     @cached_property
     def _measured_rate(self) -> float:
         return measured_rate(self.scene)
-
-    def _pairs(self, method: str) -> list[tuple[int, int]]:
-        return self.section.pairs(method, self.scene.mesh.vertices)
 
     def _labels(self, method: str, substeps: int, iterations: int) -> Row:
         vertices = self.scene.mesh.vertices

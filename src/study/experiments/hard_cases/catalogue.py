@@ -31,7 +31,7 @@ class HardCase:
     start : arguments of `start_of`
     bound : largest extent (longest side of the bounding box) that tests allow the full-order run,
         relative to the largest one of start, rest shape and fixed vertices
-    uneven : whether masses span eight decades
+    uneven : whether masses span eight decades, in random order
     settings : further keys of the scene
     """
 
@@ -45,8 +45,11 @@ class HardCase:
 
     def scene(self) -> Scene:
         """Build the scene; raise PdromError if it is refused."""
-        masses = _heavy_and_light if self.uneven else None
-        return build(MESHES[self.mesh](), *self.effects, masses=masses, **self.settings)
+        mesh, masses = MESHES[self.mesh](), None
+        if self.uneven:
+            order = np.random.default_rng(3).permutation(mesh.vertices)
+            masses = np.logspace(-4, 4, mesh.vertices)[order]
+        return build(mesh, *self.effects, masses=masses, **self.settings)
 
 
 @cache
@@ -61,34 +64,24 @@ def cases() -> dict[str, HardCase]:
 
 
 def build(
-    mesh: Mesh,
-    *effects: dict[str, Any],
-    frames: int = 30,
-    masses: Callable[[Mesh], np.ndarray] | None = None,
+    mesh: Mesh, *effects: dict[str, Any], frames: int = 30, masses: np.ndarray | None = None,
     **settings: Any,
-) -> Scene:
-    """Build a scene of ``effects`` on ``mesh``.
+) -> Scene:  # fmt: skip
+    """Build a scene of ``effects`` on ``mesh``; ``settings`` are keys of `SceneConfig`.
 
-    ``masses`` is a function of the mesh that returns masses (N,) in kg; without it, masses are
-    equal. ``settings`` are keys of `SceneConfig`.
+    ``masses`` are (N,) in kg; without them, all vertices have the same mass.
     """
     named = {"name": "hard_case", "title": "hard case"}
     own = {"mesh": {"kind": "file", "path": "generated"}, "frames": frames, **settings}
     config = validate(SceneConfig, {**named, **own, "effects": list(effects)}, "hard case")
-    return Scene.build(config, mesh, masses=None if masses is None else masses(mesh))
+    return Scene.build(config, mesh, masses=masses)
 
 
 def start_of(
-    scene: Scene,
-    mapped: list[Any] | None = None,
-    scrambled: float | None = None,
-    merged: bool = False,
-    folded: bool = False,
-    noise: float = 0.0,
-    raised: float = 0.0,
-    falling: float = 0.0,
-    meeting: float = 0.0,
-) -> State:
+    scene: Scene, mapped: list[Any] | None = None, scrambled: float | None = None,
+    merged: bool = False, folded: bool = False, noise: float = 0.0, raised: float = 0.0,
+    falling: float = 0.0, meeting: float = 0.0,
+) -> State:  # fmt: skip
     """Return the state in which a hard case begins: the rest shape, changed by each argument.
 
     mapped : matrix (3, 3), or its diagonal (3,), that maps positions about their centre
@@ -121,16 +114,6 @@ def start_of(
     return State(q, v, start.anchors)
 
 
-def _heavy_and_light(mesh: Mesh) -> np.ndarray:
-    """Masses (N,) in kg that span eight decades, in random order."""
-    order = np.random.default_rng(3).permutation(mesh.vertices)
-    return np.logspace(-4, 4, mesh.vertices)[order]
-
-
-def _sheet(wave: float = 0.0) -> Mesh:
-    return cloth(6, 6, "xz", wave=wave)
-
-
 def _changed(make: Callable[[], Mesh], factors: Any, offset: Any = (0.0, 0.0, 0.0)) -> Mesh:
     mesh = make()
     points = mesh.points * np.array(factors) + np.array(offset)
@@ -161,11 +144,12 @@ def _simplex(size: int) -> Mesh:
     return Mesh(points, cells) if size == 3 else Mesh(points, boundary(cells), cells)
 
 
-_bar, _wavy = partial(bar, 5, 3, 3), partial(_sheet, 0.05)
+_bar, _sheet = partial(bar, 5, 3, 3), partial(cloth, 6, 6, "xz")
+_wavy = partial(_sheet, wave=0.05)
 MESHES: dict[str, Callable[[], Mesh]] = {
     "sheet": _sheet,
     "wavy sheet": _wavy,
-    "wavier sheet": partial(_sheet, 0.1),
+    "wavier sheet": partial(_sheet, wave=0.1),
     "bar": _bar,
     "triangle": partial(_simplex, 3),
     "tetrahedron": partial(_simplex, 4),

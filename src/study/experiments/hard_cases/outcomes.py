@@ -15,7 +15,7 @@ from pdrom.core.yamlfile import ConfigModel, shown
 from pdrom.model.constraints.base import ConstraintGroup
 from pdrom.model.dynamics.stepper import Stepper
 from pdrom.model.effects import EFFECTS
-from pdrom.reduction.basis import Basis, group_basis
+from pdrom.reduction.basis import group_basis
 from pdrom.reduction.method import MethodSpec
 from pdrom.reduction.rerun import Rerun, rerun
 from pdrom.reduction.sampling import Reduction, select
@@ -74,6 +74,7 @@ class Training:
     """Full-order run of a hard case, with snapshots of its first group, which is reduced.
 
     positions : (F + 1, N, 3) m, initial positions first
+    snapshots : projections (n, e p, 3) of every second frame, and the norm of their round-off
     extent : longest side (m) of the bounding boxes of all frames and of the rest shape
     """
 
@@ -82,13 +83,8 @@ class Training:
         self.group: ConstraintGroup = self.scene.groups[0]
         self.start = start_of(self.scene, **case.start)
         self.positions, p, roundoff = recorded(self.scene, self.group.name, self.start)
-        self._snapshots = p[::2], float(np.linalg.norm(roundoff[::2]))
+        self.snapshots = p[::2], float(np.linalg.norm(roundoff[::2]))
         self.extent = max(self.scene.mesh.extent, float(np.ptp(self.positions, axis=1).max()))
-
-    def basis(self, spec: MethodSpec) -> Basis:
-        """Return the basis of the snapshots, with the centring, weights etc. of ``spec``."""
-        p, roundoff = self._snapshots
-        return group_basis(self.group, self.scene.masses, p, roundoff, spec)
 
 
 def names(methods: Methods) -> list[str]:
@@ -105,7 +101,8 @@ def reduced_model(training: Training, name: str, methods: Methods) -> Model | No
     """
     scene, group = training.scene, training.group
     if name in methods:
-        basis, spec = training.basis(methods[name]), methods[name]
+        spec = methods[name]
+        basis = group_basis(group, scene.masses, *training.snapshots, spec)
         r = min(R, basis.rank)
         if r == 0:
             return None

@@ -145,12 +145,9 @@ def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
 
 
 def varied(
-    config: SceneConfig,
-    time_step: float,
-    stiffness_ratio: float,
-    duration: float,
+    config: SceneConfig, time_step: float, stiffness_ratio: float, duration: float,
     frames: Sequence[int],
-) -> SceneConfig:
+) -> SceneConfig:  # fmt: skip
     """Return ``config`` with another ``time_step`` (s) and other weights of reduced groups.
 
     The weights are multiplied by ``stiffness_ratio``. Effects begin and end at the same times in s.

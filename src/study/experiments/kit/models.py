@@ -29,12 +29,9 @@ def load_reduction(
 
 
 def stored_models(
-    samplings: Sequence[File],
-    bases: Sequence[File],
-    methods: Methods,
-    ranks: Sequence[kit.Rank],
-    subspaces: Iterable[File] = (),
-) -> Iterator[tuple[Row, Model | None]]:
+    samplings: Sequence[File], bases: Sequence[File], methods: Methods,
+    ranks: Sequence[kit.Rank], subspaces: Iterable[File] = (),
+) -> Iterator[tuple[Row, Model | None]]:  # fmt: skip
     """Yield labels (columns of tables) and model for each stored model.
 
     First come those of each of ``samplings`` and each basis size r in ``ranks``, where the model is

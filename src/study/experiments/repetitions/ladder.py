@@ -97,7 +97,7 @@ def climb(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[Row
 
 def _run(runs: ReducedRuns, reduction: Reduction) -> Row:
     row, _ = runs.run(reduction)
-    row["relative_error_within_horizon"] = row["error"]
+    row["relative_error_within_horizon"] = row["error"] if np.isfinite(row["error"]) else None
     row["entries"] = sum(len(block.entries) for block in reduction.blocks)
     row["condition"] = reduction.condition
     for split in ("train", "heldout"):
@@ -109,8 +109,6 @@ def _run(runs: ReducedRuns, reduction: Reduction) -> Row:
 
 def _scatter(rows: list[Row]) -> Row:
     """Number of repetitions, and least, median and largest values over them."""
-    if not rows:
-        return {}
     errors, gains = ([row[name] for row in rows] for name in ("error", "gain"))
     found = {"repetitions": len(rows), "error_median": float(np.median(errors))}
     found |= {"error_low": min(errors), "error_high": max(errors)}

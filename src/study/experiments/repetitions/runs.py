@@ -58,12 +58,9 @@ class ReducedRuns:
         return replace(self, full=Yardstick(scene, self.full.reference[: frames + 1]))
 
     def basis(
-        self,
-        method: MethodSpec,
-        frames: int | None = None,
-        signs: int | None = None,
+        self, method: MethodSpec, frames: int | None = None, signs: int | None = None,
         motions: int = 1,
-    ) -> Basis:
+    ) -> Basis:  # fmt: skip
         """Return the basis for ``method``, from the snapshots of several training ``motions``.
 
         Of each of n motions, every n-th training snapshot is used. With a seed ``frames``, training
@@ -98,17 +95,12 @@ class ReducedRuns:
     def run(self, reduction: Reduction, offset: np.ndarray | None = None) -> tuple[Row, Rerun]:
         """Run with ``reduction``, start moved by ``offset`` (N, 3) m; return its row and the run.
 
-        The row's ``error`` is that over the frames before `end`; None if the run stopped earlier.
+        The row's ``error`` is that over the frames before `end`, inf if the run stopped earlier.
         """
         labels = {"r": reduction.r, "gain": reduction.gain}
         row, outcome = run(self.full, ProjectionModel(self.group, reduction), labels, offset)
         error = error_within(outcome.difference, self.full.displacement, self.end)
-        return row | {"error": error}, outcome
-
-    def row(self, reduction: Reduction, seed: int, offset: np.ndarray | None = None) -> Row:
-        """Row of a run with ``reduction``; the error of one that ended before `end` is inf."""
-        row, _ = self.run(reduction, offset)
-        return row | {"seed": seed, "error": np.inf if row["error"] is None else row["error"]}
+        return row | {"error": np.inf if error is None else error}, outcome
 
     def repeat(
         self, method: MethodSpec, sizes: Sequence[int], varied: Varied, asked: Repetitions
@@ -124,7 +116,7 @@ class ReducedRuns:
                 offset = kit.perturbation_field(self.full.scene, MOVED, seed)
             basis = self.basis(method, frames=None if start else seed)
             made = reductions(basis, method, sizes).values()
-            rows += [self.row(reduction, seed, offset) for reduction in made]
+            rows += [self.run(reduction, offset)[0] | {"seed": seed} for reduction in made]
         return sorted(rows, key=lambda row: row["r"])
 
     def on_motions(self, method: MethodSpec, sizes: Sequence[int]) -> Iterator[Row]:
@@ -132,8 +124,9 @@ class ReducedRuns:
         for count in TRAINED_ON:
             made = reductions(self.basis(method, motions=count), method, sizes)
             for reduction in made.values():
-                for number, own in enumerate(self._held_out, 1):
-                    yield own.row(reduction, number) | {"varied": f"held out, {count} trained"}
+                varied = f"held out, {count} trained"
+                for seed, own in enumerate(self._held_out, 1):
+                    yield own.run(reduction)[0] | {"seed": seed, "varied": varied}
 
 
 def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
