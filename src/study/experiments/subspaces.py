@@ -203,12 +203,10 @@ def _runs(
             row, outcome = run(motion, model, own | {"motion": name})
             row["playback_error"] = played[name]
             if compared:
-                series = {"coordinates": outcome.coordinates}
-                made = store.create_group(name)
-                row["energy_ratio"] = store_series(made, motion, outcome, **series)
+                own_store, z = store.create_group(name), outcome.coordinates
+                row["energy_ratio"] = store_series(own_store, motion, outcome, coordinates=z)
             else:
-                end = scene.config.frames
-                row["deformation_error"] = motion.errors(outcome.positions, end)[1]
+                _, row["deformation_error"] = motion.errors(outcome.positions, scene.config.frames)
             rows.append(row)
             log.info("%s %s, %s: error %s", base, labels["method"], name, row["relative_error"])
     order = list(motions)

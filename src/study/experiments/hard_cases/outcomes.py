@@ -31,7 +31,6 @@ from study.experiments.hard_cases.catalogue import FILES, LIST, HardCase, cases,
 from study.experiments.kit.base import experiment
 
 HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"
-FAILURES = ("refused", "singular", "blow-up", "distorted")
 R, K, TOLERANCE = 10, 6, 1e-2
 HRPD = HrpdSpec(dimension=20, samples=60)
 BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
@@ -114,11 +113,9 @@ def reduced_model(training: Training, name: str, methods: Methods) -> Model | No
         start = reduced_state(scene, columns, training.start)
         frames = np.arange(scene.config.frames)
         return sampled_models([scene], columns, frames, [TOLERANCE], start)[0]
-    if sampling == "hrpd":
-        points = scene.mesh.points
-        found = {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in scene.groups}
-        return SubspaceModel(columns, found)
-    return SubspaceModel(columns)
+    fitted, points = scene.groups if sampling == "hrpd" else (), scene.mesh.points
+    found = {g.name: hrpd(g, columns, sampled_space(g, points, HRPD)) for g in fitted}
+    return SubspaceModel(columns, found)
 
 
 def reduced_run(training: Training, model: Model) -> Rerun:
@@ -138,8 +135,7 @@ def row(
     try:
         model = reduced_model(training, name, methods)
         if model is None:
-            why = "projections are round-off"
-            return {"r": 0, "frames": 0, "outcome": NOTHING, "why": why}
+            return {"r": 0, "frames": 0, "outcome": NOTHING, "why": "projections are round-off"}
         run = reduced_run(training, model)
     except NotReducibleError as error:
         return {"frames": 0, "outcome": NOT_TAKEN, "why": str(error)}
@@ -157,15 +153,9 @@ def row(
         outcome = "blow-up"
     elif extent > DISTORTED:
         outcome = "distorted"
-    return {
-        **sizes,
-        "frames": run.frames,
-        "finite": run.finite,
-        "blowup_frame": run.blowup_frame,
-        "max_extent": extent,
-        "outcome": outcome,
-        "why": expected[name].why if name in expected and outcome != HOLDS else "",
-    }
+    ended = {"frames": run.frames, "finite": run.finite, "blowup_frame": run.blowup_frame}
+    why = expected[name].why if name in expected and outcome != HOLDS else ""
+    return {**sizes, **ended, "max_extent": extent, "outcome": outcome, "why": why}
 
 
 class HardCases(ConfigModel):
