@@ -124,10 +124,9 @@ def test_a_table_has_no_times_of_two_machines(name, tmp_path):
 
 
 def test_steps_that_cost_too_much_are_left_out():
-    work = {"anderson": 2000, "converged": 100, "training": 40}
+    work = {"anderson": 2000, "converged": 100}
     asked = Comparison(work=work, steps=STEPS)
     assert asked.pairs("anderson", 10) == [(1, 200)]
     assert asked.pairs("anderson", 11) == []
     assert asked.pairs("coarser-mesh", 10**6) == [(1, 10), (1, 2000)]
     assert [asked.affords("converged", cost) for cost in (100, 101)] == [True, False]
-    assert [n for n in (1, 2, 4, 8) if asked.affords("training", 10 * n)] == [1, 2, 4]

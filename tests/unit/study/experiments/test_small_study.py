@@ -282,10 +282,6 @@ def test_every_setting_holds_every_model_once(again, monkeypatch):
     assert len(beyond) == 6
     assert (beyond.frames == 0).all()
     assert beyond[["finite", "relative_error", "energy_ratio", "gain"]].isna().all(axis=None)
-    at_home = (short_runs.h == STEP) & (short_runs.stiffness_ratio == 1.0) & (short_runs.r == 2)
-    own = short_runs[at_home].set_index("method")
-    assert own.relative_error["pod"] < 0.05
-    assert own.gain["pod"] == 1.0 < own.gain[METHOD]
 
 
 @pytest.mark.parametrize("split", ["train", *MOTIONS])

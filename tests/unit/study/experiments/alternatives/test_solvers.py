@@ -3,8 +3,6 @@
 Also the two-level method, which reaches the same step in fewer iterations.
 """
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,6 @@ from pdrom.model.dynamics.stepper import State
 from pdrom.model.runs import ConvergedStepper, converged_run, followed
 from pdrom.reduction.subspace.model import Samples, SubspaceModel
 from pdrom.reduction.subspace.training import make_columns
-from study.experiments.alternatives.experiment import substepped
 from study.experiments.alternatives.solvers import Chebyshev, TwoLevel, measured_rate
 
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
@@ -64,16 +61,6 @@ def test_the_rate_is_that_at_which_plain_iterations_approach_their_limit(weight)
     ends = [scene.iterated(k).stepper().step(start, 0)[0].positions for k in (120, 121)]
     misses = [np.linalg.norm(end - limit) for end in ends]
     assert measured_rate(scene) == pytest.approx(misses[1] / misses[0], rel=0.02)
-
-
-def test_substeps_approach_one_motion():
-    """A method of first order: what quartering the step changes falls to a quarter."""
-    scene, ends = small("spring", *HELD, weight=1e4), []
-    for n in (10, 40, 160, 640):
-        split = substepped(scene, n).iterated(4)
-        ends.append(followed(split.stepper(), split.initial_state(), 5 * n)[-1])
-    changes = [np.linalg.norm(after - before) for before, after in pairwise(ends)]
-    assert changes[0] > 2.5 * changes[1] > 2.5**2 * changes[2]
 
 
 def test_handles_and_floor_act_as_in_the_step_loop():

@@ -28,10 +28,8 @@ def test_schedules_keep_their_seconds_and_only_the_reduced_weight_changes():
         ([6, 10, 20, "full"], 69, [6, 10, 20, 69]),
         (["full", 10, 6], 8, [6, 8, 10]),
         ([6, "full"], 6, [6]),
-        ([6, 6], 9, [6]),
         ([6, "full"], 0, [6]),
         (["full"], 0, []),
-        ([6, 10], 3, [6, 10]),
     ],
 )
 def test_sizes_ascend_and_full_is_the_rank(asked, rank, sizes):
