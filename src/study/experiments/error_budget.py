@@ -6,18 +6,19 @@ converged runs.
 
 import logging
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
-from pdrom.api import Model, Run, train
 from pdrom.core.store import write_table
 from pdrom.core.yamlfile import ConfigModel, SceneName
-from pdrom.model.scene import SceneConfig
+from pdrom.model.runs import BLOWUP_EXTENT
+from pdrom.model.scene import Scene, SceneConfig
 from pdrom.reduction.deviations import Yardstick
-from pdrom.reduction.subspace.model import SubspaceModel
+from pdrom.reduction.rerun import rerun
+from pdrom.reduction.subspace.model import ALL, SubspaceModel
 from pdrom.reduction.subspace.space import projector
+from pdrom.reduction.subspace.training import make_columns, sampled_models
 from study.artifact import paths
 from study.artifact.paths import File
 from study.artifact.reads import Every, Setting
@@ -25,6 +26,7 @@ from study.experiments.kit import base as kit
 from study.experiments.references import converged_positions
 
 log = logging.getLogger(__name__)
+Part = tuple[str, np.ndarray]
 
 PARTS = SPAN, CLOSURE, SAMPLING, RUN, FULL_ORDER = (
     "span", "closure", "sampling", "run", "full_order",
@@ -77,10 +79,9 @@ def error_budget(
         if training is None:
             break
         scene = kit.scene_of(config, mesh)
-        own = Run(scene, training, np.zeros(config.frames))
-        model = train(
-            own, modes=asked.modes, tolerance=asked.tolerance, skinning=skinning, converged=False
-        )
+        columns = make_columns([scene], training[1:], asked.modes, skinning)
+        frames = np.arange(config.frames)
+        (model,) = sampled_models([scene], columns, frames, [asked.tolerance])
         labels = {"scene": config.name, "k": asked.modes, "skinning": skinning}
         for run in full_order:
             motion, end = run["run"], horizon.frames(sensitivity, run["run"])
@@ -88,28 +89,32 @@ def error_budget(
                 continue
             test = kit.scene_of(config, mesh, motion).changed(frames=end)
             yardstick = Yardstick(test, reference[: end + 1])
-            used = model.reduced.elements_evaluated(test)
+            used = model.elements_evaluated(test)
             row = labels | {"motion": motion, "elements_sampled": used, "frames": end}
-            parts = [*_parts(model, yardstick, asked), (FULL_ORDER, kit.positions_of(run, end))]
-            for part, positions in parts:
+            full = FULL_ORDER, kit.positions_of(run, end)
+            for part, positions in (*_parts(model, yardstick, asked.iterations), full):
                 errors = zip(COLUMNS[-2:], yardstick.errors(positions, end), strict=True)
                 rows.append({**row, "part": part, **dict(errors)})
             log.info("%s, %d skinning columns: done", motion, skinning)
     write_table(pd.DataFrame(rows, columns=COLUMNS), out.path)
 
 
-def _parts(model: Model, yardstick: Yardstick, asked: Budget) -> Iterator[tuple[str, np.ndarray]]:
+def _parts(model: SubspaceModel, yardstick: Yardstick, few: int) -> Iterator[Part]:
     """Yield name of a part of the budget, and the positions (F + 1, N, 3) m that it reaches.
 
     They are the best approximation of the reference in the subspace, runs whose frames converge,
-    with all elements and with the sampled ones, and a run of a few iterations.
+    with all elements and with the sampled ones, and a run of ``few`` iterations.
     """
-    scene, reduced = yardstick.scene, model.reduced
-    assert isinstance(reduced, SubspaceModel)
-    columns = reduced.columns
+    scene, columns = yardstick.scene, model.columns
     yield SPAN, columns.B @ (projector(columns, scene.masses) @ yardstick.reference)
-    whole = replace(model, reduced=SubspaceModel(columns))
-    yield CLOSURE, whole.run(scene, solver="newton").positions
-    yield SAMPLING, model.run(scene, solver="newton").positions
-    few = model.run(scene, iterations=asked.iterations, solver="local_global")
-    yield RUN, few.positions
+    yield CLOSURE, _run(SubspaceModel(columns), scene)
+    yield SAMPLING, _run(model, scene)
+    yield RUN, _run(model, scene, few)
+
+
+def _run(model: SubspaceModel, scene: Scene, iterations: int | None = None) -> np.ndarray:
+    """Run with so many local/global iterations, or until each frame converges; the positions."""
+    asked = scene.iterated(iterations or ALL, scene.config.anderson_window)
+    loop, start = model.loop(asked, newton=iterations is None)
+    output = model.output(float)
+    return rerun(scene, loop, start, None, BLOWUP_EXTENT, lambda z: output(z).copy()).positions

@@ -209,8 +209,8 @@ def _runs(
                 _, row["deformation_error"] = motion.errors(outcome.positions, scene.config.frames)
             rows.append(row)
             log.info("%s %s, %s: error %s", base, labels["method"], name, row["relative_error"])
-    order = list(motions)
-    return pd.DataFrame(sorted(rows, key=lambda row: order.index(row["motion"])), columns=_MADE)
+    rows.sort(key=lambda row: list(motions).index(row["motion"]))
+    return pd.DataFrame(rows, columns=_MADE)
 
 
 def _models(motion: Yardstick, settings: SubspaceModels) -> Iterator[subspace.Labelled]:

@@ -154,10 +154,10 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
     """Measure times of frames, local steps and effects, and of frames with an effect left out."""
     scene, asked = kit.scene_of(settings.scene, mesh), settings.timing
     name, frames = scene.config.name, min(asked.frames, scene.config.frames)
-    common = {"scene": name, "vertices": scene.mesh.vertices, "iterations": scene.config.iterations}
+    common = {"scene": name, "vertices": scene.mesh.vertices, "implementation": "compiled"}
+    common["iterations"] = scene.config.iterations
     slow, quick = _full_order(scene, frames, asked, common)
     quick += _other_settings(scene, frames, settings.iterations, common)
-    common["implementation"] = "compiled"
     alone: dict[tuple[str, str, int], ReducedLocalStep] = {}
     sizes = (*settings.ranks, *asked.breakeven)
     given = files["samplings"], files["bases"], settings.methods, sizes, files["subspaces"]
@@ -194,7 +194,7 @@ def _full_order(
     scene: Scene, frames: int, asked: Timing, common: dict[str, Any]
 ) -> tuple[Variant, list[Variant]]:
     """Return the full-order runs to time: interpreted code with fewer iterations; all others."""
-    made = [variant(scene, frames, {**common, "implementation": "compiled"})]
+    made = [variant(scene, frames, common)]
     for name, step in IMPLEMENTATIONS.items():
         steps = [step(group) for group in scene.groups]
         fewer = min(frames, getattr(asked, f"{name}_frames"))
@@ -208,7 +208,6 @@ def _other_settings(
     scene: Scene, frames: int, asked: IterationCounts, common: dict[str, Any]
 ) -> list[Variant]:
     """Full-order runs with other settings than the scene's: iterations, acceleration, meshes."""
-    common = {**common, "implementation": "compiled"}
     own = {"method": kit.FOM, **{key: common[key] for key in ("iterations", "vertices")}}
     return [
         each.variant(common, frames)

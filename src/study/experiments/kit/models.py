@@ -43,8 +43,7 @@ def stored_models(
         wanted = {"scene": file["scene"], "group": file["group"], "basis": spec.basis_id}
         found = next((each for each in bases if each.labels == wanted), None)
         if found is None:
-            fault = f"its basis {spec.basis_id} is not among the files read"
-            raise StorageError(f"{file.path}: {fault}")
+            raise StorageError(f"{file.path}: its basis {spec.basis_id} is not in the files read")
         basis = load_basis(found.path)
         for r in kit.resolve_ranks(ranks, basis.rank):
             own: Row = {"group": file["group"], "method": file["method"], "r": r}

@@ -109,18 +109,16 @@ def repetitions(settings: Options, **files: paths.File) -> None:
             rows += [cell | row for row in found]
         log.info("%s", own.method)
     _write(rows, COLUMNS, files["out"])
-    climbed = settings.own_ladder and ladder.climb(runs, short, settings.own_ladder)
-    _write(
-        (labels | row for row in climbed or ()), ladder.COLUMNS, files["rungs"],
-        ("blowup_frame", "repetitions", "entries"),
-    )  # fmt: skip
+    climbed = ladder.climb(runs, short, settings.own_ladder) if settings.own_ladder else ()
+    counts = ["blowup_frame", "repetitions", "entries"]
+    _write((labels | row for row in climbed), ladder.COLUMNS, files["rungs"], counts)
     reduced: list[Row] = []
     with write_hdf5(files["noise_runs"].path) as file:
         if (asked := settings.own_noise) is not None:
             given = short.full.scene, runs.group, asked, settings.noise_methods
             reduced = noise.noisy_runs(*given, file)
-    noisy = (labels | row for row in reduced)
-    _write(noisy, noise.COLUMNS, files["noise"], ("frames", "blowup_frame"))
+    counts = ["frames", "blowup_frame"]
+    _write((labels | row for row in reduced), noise.COLUMNS, files["noise"], counts)
 
 
 def _write(
