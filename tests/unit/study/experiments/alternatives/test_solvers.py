@@ -1,7 +1,4 @@
-"""All methods: same implicit step as projective dynamics, momentum, order, degenerate states.
-
-Also the two-level method, which reaches the same step in fewer iterations.
-"""
+"""Other methods end at the implicit step of projective dynamics; two levels save iterations."""
 
 import numpy as np
 import pytest
@@ -16,8 +13,7 @@ from study.experiments.alternatives.solvers import Chebyshev, TwoLevel, measured
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 HELD = (GRAVITY, LEFT)
 CLOSED_FORM = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
-# Methods that minimise the objective of a frame, and iterations that suffice on these meshes.
-CHEBYSHEV = 1500
+CHEBYSHEV = 1500  # iterations that suffice on these meshes
 
 
 def small(group: str, *effects: dict, weight: float = 1e5, **settings):
