@@ -56,7 +56,6 @@ class Options(ConfigModel):
     "Sampling and reruns of {scene}, {group} by {method}",
     reads={
         "mesh": paths.MESH,
-        "fom": paths.TRAIN,
         "motions": Every(paths.FULL_ORDER),
         "converged": Every(paths.CONVERGED),
         "snapshots": paths.SNAPSHOTS,
