@@ -218,7 +218,7 @@ def shape_norms(runs: np.ndarray, reference: np.ndarray) -> list[float]:
 
 
 def test_test_trajectories_are_what_numpy_finds_in_the_stored_runs(array, at, mesh):
-    made = declared()["test_trajectories"]([File(at(paths.REFERENCES), {})])
+    made = declared()["test_trajectories"](read_table(at(paths.REFERENCES)))
     assert made.motion.tolist() == list(MOTIONS)
     training = array(paths.CONVERGED.where(run="train"), "positions")[1:]
     rest = np.repeat(mesh.points[None], 8, axis=0)
