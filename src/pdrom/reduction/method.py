@@ -16,7 +16,7 @@ from pdrom.core.yamlfile import ConfigModel, read_yaml, shown, validate
 SELECTIONS = Registry(
     "selection",
     {
-        "greedy": "pdrom.reduction.sampling.deim:Greedy",
+        "greedy": "pdrom.reduction.sampling.greedy:Greedy",
         "pivoted-qr": "pdrom.reduction.sampling.qdeim:PivotedQR",
         "s-opt": "pdrom.reduction.sampling.s_opt:SOpt",
     },

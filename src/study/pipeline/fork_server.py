@@ -11,6 +11,7 @@ import runpy
 import signal
 import subprocess
 import sys
+import time
 from multiprocessing import forkserver
 from multiprocessing.connection import wait
 from threading import Lock
@@ -24,6 +25,7 @@ from study.artifact import planned
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"
 # `multiprocessing` starts and collects processes in one thread at a time.
 _ONE_AT_A_TIME = Lock()
+ATTEMPTS = 50
 
 
 def start_server(preloaded: str = "study.pipeline.preloaded") -> None:
@@ -51,9 +53,8 @@ def run_script(script: str) -> None:
     Raises CalledProcessError with the exit status, or the negative number of the signal, of a
     script that fails, as `subprocess` does.
     """
-    job = cast(Any, multiprocessing.get_context(METHOD)).Process(target=_run_as_main, args=[script])
     with _ONE_AT_A_TIME:
-        job.start()
+        job = _started(script)
     wait([job.sentinel])
     with _ONE_AT_A_TIME:
         job.join()
@@ -61,6 +62,22 @@ def run_script(script: str) -> None:
         job.close()
     if status:
         raise subprocess.CalledProcessError(status, script)
+
+
+def _started(script: str) -> Any:
+    """Start a process that runs ``script``; another server takes the place of one that has died."""
+    for attempt in range(ATTEMPTS):
+        job = cast(Any, multiprocessing.get_context(METHOD)).Process(
+            target=_run_as_main, args=[script]
+        )
+        try:
+            job.start()
+            return job
+        except (EOFError, OSError):  # a server that was just killed is not yet seen as ended
+            if attempt == ATTEMPTS - 1:
+                raise
+            time.sleep(0.1)
+    return None
 
 
 def _run_as_main(script: str) -> None:

@@ -33,14 +33,6 @@ class Selection(ABC):
         return oversample(v, size, chosen, count)
 
 
-class Greedy(Selection):
-    """DEIM by entries or elements; the samples for r modes begin with those for fewer modes."""
-
-    def one_a_mode(self, v: np.ndarray, size: int, ranks: Sequence[int]) -> dict[int, np.ndarray]:
-        path = deim_entries(v) if size == 1 else block_elements(v, size)
-        return {r: path[:r] for r in ranks}
-
-
 # Of residual entries that differ by less than this fraction, `tie_weights` may favour the first.
 TIE = 1e-6
 

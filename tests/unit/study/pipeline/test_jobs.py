@@ -34,10 +34,10 @@ def test_every_table_finds_what_it_reads_in_the_order_of_the_study():
         assert made[name].inputs.keys() | made[name].settings.keys() == table.reads.keys()
         assert made[name].outputs == {"table": f"out/tables/{name}.csv"}
     assert made["sensitivity"].inputs == {
-        "parts": ["out/sensitivity/spring_oop.csv", "out/sensitivity/strain_oop.csv"]
+        "rows": ["out/sensitivity/spring_oop.csv", "out/sensitivity/strain_oop.csv"]
     }
     assert made["equal_error"].inputs["rows"] == "out/tables/alternatives.csv"
-    assert made["online"].inputs["parts"] == []
+    assert made["online"].inputs["rows"] == []
     assert made["claims"].inputs["rules"] == "config/claims.yaml"
 
 
