@@ -15,7 +15,7 @@ from places import CONFIG, ROOT, tracked
 from study.artifact.paths import RESULTS
 from study.pipeline.study import StudySettings
 from study.tables.kit.results import trained
-from study.verification.references import folder_of, read_references
+from study.verification.compare import folder_of, read_references
 from vocabulary import gone, known
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])

@@ -1,10 +1,15 @@
-"""Typesetting of texts that a user wrote.
+r"""Typesetting of texts that a user wrote, and of titles and captions in mark-up.
 
 The manuscript is typeset by pdfTeX with T1 fonts: Latin letters stand as they are, Greek letters
 and signs become formulas. Figures are drawn with DejaVu Sans, which has all of them.
+
+In the mark-up, a name between backticks is set in typewriter, ``$r \le 20$`` is mathematics, and
+``{key}`` stands for the value of a setting of the configuration.
 """
 
+import re
 import unicodedata
+from collections.abc import Callable
 from typing import Any
 
 from pdrom.core.errors import ConfigurationError, PaperError
@@ -31,6 +36,8 @@ _GREEK = """alpha beta gamma delta zeta eta theta iota kappa lambda mu nu xi pi 
 psi omega sigma phi"""
 # TeX has no commands for capital Greek letters that look like Latin ones.
 _LATIN_CAPITALS = dict(zip("ΑΒΕΖΗΙΚΜΝΟΡΤΧ", "ABEZHIKMNOPTX", strict=True))
+_MARK = re.compile(r"`([^`]*)`|\$([^$]*)\$")
+_KEY = re.compile(r"\{([a-z_.]+)\}")
 
 
 def escape(text: str) -> str:
@@ -89,3 +96,33 @@ def _greek(character: str) -> str | None:
     if len(words) != 4 or words[::2] != ["greek", "letter"] or words[3] not in _GREEK.split():
         return None
     return "\\" + (words[3].capitalize() if words[1] == "capital" else words[3])
+
+
+def filled(text: str, value: Callable[[str], float]) -> str:
+    """Return ``text`` with each ``{key}`` replaced by the number that ``value`` returns for it."""
+    return _KEY.sub(lambda found: number(value(found[1])), text)
+
+
+def number(value: float) -> str:
+    """Format ``value`` as a formula in mark-up; exponents become powers of ten."""
+    mantissa, mark, exponent = f"{value:g}".partition("e")
+    if not mark:
+        return f"${mantissa}$"
+    factor = "" if mantissa == "1" else rf"{mantissa} \cdot "
+    return f"${factor}10^{{{int(exponent)}}}$"
+
+
+def to_tex(text: str) -> str:
+    """Convert the mark-up ``text`` to TeX."""
+    pieces, end = [], 0
+    for found in _MARK.finditer(text):
+        pieces.append(escape(text[end : found.start()]))
+        name, formula = found.groups()
+        pieces.append(f"${formula}$" if name is None else rf"\texttt{{{escape(name)}}}")
+        end = found.end()
+    return "".join([*pieces, escape(text[end:])])
+
+
+def to_plain(text: str) -> str:
+    """Remove the marks of names and formulas from the mark-up ``text`` of a title."""
+    return re.sub("[`$]", "", text)

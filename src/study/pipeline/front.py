@@ -12,8 +12,8 @@ from study.pipeline.signals import handle, leave
 # First argument of ``./reproduce`` -> program that is run with the remaining arguments.
 HANDED_ON = {
     "test": (sys.executable, "-m", "pytest"),
-    "verify": (sys.executable, "-m", "study.verification.command"),
-    "bundle": (sys.executable, "-m", "study.verification.bundle"),
+    "verify": (sys.executable, "-m", "study.verification.command", "verify"),
+    "bundle": (sys.executable, "-m", "study.verification.command", "bundle"),
     "run": ("env",),
 }
 

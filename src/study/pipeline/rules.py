@@ -5,7 +5,7 @@ from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any
 
-from study.artifact.markup import to_plain
+from study.artifact.text import to_plain
 from study.experiments.kit.base import Experiment
 from study.pipeline.plan import Job, Plan
 

@@ -19,8 +19,8 @@ from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import SceneConfig
 from pdrom.reduction.method import MethodSpec
 from study.artifact import paths
-from study.artifact.markup import filled, to_tex
 from study.artifact.reads import Labels
+from study.artifact.text import filled, to_tex
 from study.experiments.frame_times import NamedScene, ProjectionCase, SubspaceCase
 from study.experiments.kit.base import Horizon, OfScene
 from study.experiments.repetitions.experiment import Cell, Repeated

@@ -3,15 +3,26 @@
 A stable cell may differ by the tolerance of its column. Rounding errors decide unstable cells: a
 share of them may change, in each column and in each part of its rows. By the same count rule, a
 share of the stable cells may shift, that is, differ by more than a part of their tolerance.
+
+Expected tables are kept in git below ``results/reference``, without columns that are never compared
+and with numbers of `DIGITS` digits. A table is a CSV file, whose changes git shows; a large table
+is compressed (``.csv.xz``) to save space.
 """
 
+import lzma
 import math
 from collections.abc import Iterator, Mapping
+from datetime import date
 from itertools import chain
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from pdrom.core.errors import StorageError
+from pdrom.core.store import atomic_path, write_text
+from study.artifact.paths import RESULTS
 from study.artifact.reads import ProjectFile
 from study.tables import declared
 from study.tables.kit.declaration import TOLERANCES, WORDS, Column, Table
@@ -245,3 +256,62 @@ def _place(table: Table, rows: pd.DataFrame, row: int) -> str:
     cells = [(name, _text(rows[name].iloc[row])) for name in names]
     words = [f"{name} {cell}" for name, cell in cells if cell][:CELLS_IN_MESSAGE]
     return f"row {rows.index[row] + 1} ({', '.join(words)})"
+
+
+# Stored digits of numbers; the error of rounding is at most a hundredth of any tolerance.
+DIGITS = 9
+SUFFIXES, PACKED_BYTES = (".csv", ".csv.xz"), 50_000  # larger files (in bytes) are compressed
+LOG = "changes.md"
+LOG_HEADER = """# Changes of the expected tables
+
+Written by `./reproduce verify --update --reason "..."`, newest last.
+
+"""
+
+
+class Reference(NamedTuple):
+    """Expected table: ``frame`` has all declared columns, the table's file has only ``columns``."""
+
+    frame: pd.DataFrame
+    columns: tuple[str, ...]
+
+
+def folder_of(results: str) -> Path:
+    """Folder of the expected tables with which those in the folder ``results`` are compared."""
+    root = Path(RESULTS)
+    return root / "reference" / Path(results).relative_to(root) / "tables"
+
+
+def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
+    """Write ``frame``, the content of ``table``, as the expected table into ``folder``."""
+    stored, form = frame[[c.name for c in kept(table)]], f"%.{DIGITS}g"
+    content = stored.to_csv(index=False, float_format=form, lineterminator="\n").encode()
+    path, other = (folder / f"{table.name}{suffix}" for suffix in SUFFIXES)
+    if len(content) > PACKED_BYTES:
+        path, other, content = other, path, lzma.compress(content, preset=9)
+    with atomic_path(path, with_checksum=False) as temporary:
+        temporary.write_bytes(content)
+    other.unlink(missing_ok=True)
+
+
+def read_references(folder: Path) -> dict[str, Reference]:
+    """Return name -> expected table in ``folder``; StorageError if one cannot be read."""
+    found = {}
+    for name, table in declared().items():
+        for path in (p for suffix in SUFFIXES if (p := folder / f"{name}{suffix}").is_file()):
+            try:
+                frame = pd.read_csv(path)
+            except (OSError, EOFError, lzma.LZMAError, ValueError) as error:
+                reason = " ".join(str(error).split())
+                raise StorageError(f"{path}: cannot be read ({reason})") from error
+            whole = table.checked(frame.reindex(columns=list(table.column_names)))
+            found[name] = Reference(whole, tuple(frame.columns))
+    return found
+
+
+def note(folder: Path, reason: str, day: date, code: str) -> None:
+    """Add ``day``, version of the code and reason of an update to the log in ``folder``."""
+    path = folder / LOG
+    text = path.read_text(encoding="utf-8") if path.is_file() else LOG_HEADER
+    line = f"- {day:%Y-%m-%d}, code {code}: {reason}\n"
+    write_text(text + line, path, with_checksum=False)

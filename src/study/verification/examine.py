@@ -17,8 +17,8 @@ from study.tables import declared
 from study.tables.claims.claims import RULES, timed_columns
 from study.tables.claims.rules import load_claims
 from study.verification import compare
+from study.verification.compare import Reference, folder_of, read_references
 from study.verification.files import differing, is_derived
-from study.verification.references import Reference, folder_of, read_references
 from study.verification.subject import Subject
 
 # Columns of the table claims with verdicts, and their names in messages.

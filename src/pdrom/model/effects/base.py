@@ -95,6 +95,7 @@ class Effect(ABC):
 
     def __init__(self, config: EffectConfig, mesh: Mesh, masses: np.ndarray) -> None:
         """Bind ``config`` to a mesh whose vertices have ``masses`` (N,) kg."""
+        self.mesh, self.masses = mesh, masses
         self.config: Any = config
         self.name: str = config.effect
 

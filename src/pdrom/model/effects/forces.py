@@ -1,4 +1,4 @@
-"""Forces on vertices: gravity, damping, drag on the surface, and wind."""
+"""Forces on vertices (gravity, damping, drag on the surface, wind), and initial velocities."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field
 
-from pdrom.model.effects.base import EffectConfig, Force, Vector
+from pdrom.model.effects.base import EffectConfig, Force, Seed, Start, Vector
 from pdrom.model.mesh.types import Mesh, barycentric_areas
 
 
@@ -79,15 +79,12 @@ class Drag(Force):
         effect: Literal["drag"] = "drag"
         coefficient: Annotated[float, Field(ge=0.0, le=1e12)]
 
-    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
-        super().__init__(config, mesh, masses)
-        areas = barycentric_areas(mesh.points, mesh.triangles)
-        self._rates = config.coefficient * areas / masses
-
     @cached_property
     def rate(self) -> np.ndarray:  # type: ignore[override]
         """Relative loss of velocity in a frame, divided by the time step, (N,) 1/s."""
-        return -np.expm1(-self._rates * self.time_step) / self.time_step
+        areas = barycentric_areas(self.mesh.points, self.mesh.triangles)
+        rates = self.config.coefficient * areas / self.masses
+        return -np.expm1(-rates * self.time_step) / self.time_step
 
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         return -self.rate[:, None] * velocities
@@ -117,25 +114,61 @@ class Wind(Force):
 
     in_subspace = False
 
-    def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
-        super().__init__(config, mesh, masses)
-        self._half_density = 0.5 * config.density * config.coefficient
-        self._triangles, self._masses = mesh.triangles, masses
-
     def acceleration(self, positions: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-        corners = positions[self._triangles]
+        triangles = self.mesh.triangles
+        corners = positions[triangles]
         vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         area = np.linalg.norm(vector, axis=1)
         normal = vector / np.where(area > 0.0, area, 1.0)[:, None]
-        relative = self.config.velocity - velocities[self._triangles].mean(axis=1)
+        relative = self.config.velocity - velocities[triangles].mean(axis=1)
         speed = np.einsum("ij,ij->i", relative, normal)
-        kappa = self._half_density * self._at_vertices(area / 3.0) / self._masses
-        slowing = 1.0 + self.time_step * kappa[self._triangles].max(axis=1) * np.abs(speed)
-        force = (self._half_density * np.abs(speed) * speed / slowing)[:, None] * vector
+        half_density = 0.5 * self.config.density * self.config.coefficient
+        kappa = half_density * self._at_vertices(area / 3.0) / self.masses
+        slowing = 1.0 + self.time_step * kappa[triangles].max(axis=1) * np.abs(speed)
+        force = (half_density * np.abs(speed) * speed / slowing)[:, None] * vector
         shares = np.stack([self._at_vertices(f / 3.0) for f in force.T], axis=1)
-        return shares / self._masses[:, None]
+        return shares / self.masses[:, None]
 
     def _at_vertices(self, values: np.ndarray) -> np.ndarray:
         """Return sums (N,) of ``values`` (T,) over the triangles around each vertex."""
         corners = np.repeat(values, 3)
-        return np.bincount(self._triangles.ravel(), corners, minlength=len(self._masses))
+        return np.bincount(self.mesh.triangles.ravel(), corners, minlength=self.mesh.vertices)
+
+
+class Velocity(Start):
+    """The same initial velocity of all vertices; held ones follow their targets instead."""
+
+    class Config(EffectConfig):
+        """Velocity ``value`` in m/s."""
+
+        effect: Literal["velocity"] = "velocity"
+        value: Vector
+
+    def velocity(self) -> np.ndarray:
+        return np.array(self.config.value)
+
+
+class Kick(Start):
+    """Random initial velocity: combination of 1, x, y, z, xy, yz, zx with seeded coefficients.
+
+    Coordinates are relative to the mean vertex and to half the longest side. Such polynomials
+    excite slow motions of the whole body, without noise at the scale of elements.
+    """
+
+    class Config(EffectConfig):
+        """``speed`` is the largest vertex speed in m/s; velocities are along ``axes`` only."""
+
+        effect: Literal["kick"] = "kick"
+        speed: Annotated[float, Field(gt=0.0, le=1e3, allow_inf_nan=False)]
+        seed: Seed
+        axes: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1)] = ("x", "y", "z")
+
+    def velocity(self) -> np.ndarray:
+        points, half = self.mesh.points, 0.5 * self.mesh.extent
+        x, y, z = ((points - points.mean(axis=0)) / half).T
+        fields = np.stack([np.ones_like(x), x, y, z, x * y, y * z, z * x], axis=1)
+        generator = np.random.default_rng(self.config.seed)
+        coefficients = generator.standard_normal((fields.shape[1], 3))
+        coefficients[:, ["xyz"[a] not in self.config.axes for a in range(3)]] = 0.0
+        velocity = fields @ coefficients
+        return velocity * (self.config.speed / np.linalg.norm(velocity, axis=1).max())

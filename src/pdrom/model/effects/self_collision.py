@@ -43,7 +43,6 @@ class SelfCollision(Contact):
 
     def __init__(self, config: Config, mesh: Mesh, masses: np.ndarray) -> None:
         super().__init__(config, mesh, masses)
-        self._rest, self._inverse_masses = mesh.points, 1.0 / masses
         self._thickness = config.thickness
         edges = mesh.points[mesh.edges()]
         self._needed = COVER * np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).max()
@@ -66,7 +65,7 @@ class SelfCollision(Contact):
         self.apply(positions, before, np.empty(0, dtype=np.int64))
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
-        inverse_masses = self._inverse_masses.copy()
+        inverse_masses = 1.0 / self.masses
         inverse_masses[held] = 0.0
         for _ in range(SEARCHES):
             pairs = self._pairs(positions)
@@ -84,7 +83,8 @@ class SelfCollision(Contact):
         from scipy.spatial import cKDTree
 
         close = cKDTree(positions).query_pairs(REACH * self._thickness, output_type="ndarray")
-        apart = np.linalg.norm(self._rest[close[:, 0]] - self._rest[close[:, 1]], axis=1)
+        rest = self.mesh.points
+        apart = np.linalg.norm(rest[close[:, 0]] - rest[close[:, 1]], axis=1)
         close = close[apart > self._thickness].astype(np.int64)
         return close[np.lexsort((close[:, 1], close[:, 0]))]
 

@@ -33,9 +33,9 @@ from pdrom.view import style
 from pdrom.view.artists import Figure, Line2D
 from pdrom.view.camera import Camera, up_of
 from study.artifact.artifact import Artifact, declare, declared_in
-from study.artifact.markup import to_plain
 from study.artifact.paths import FIGURE, FIGURE_PICTURE, File
 from study.artifact.reads import Read, Setting, TableOf
+from study.artifact.text import to_plain
 from study.tables.effects_cost import unreliable
 
 MESHES = "disc_strain ball_shell torus_release starfish_twist"  # scenes of config/extended.yaml
@@ -216,7 +216,7 @@ NO_DATA = "no data in this configuration; the full study (config/default.yaml) d
 class Declaration(Artifact):
     """Figure of the study, named after the function that draws it.
 
-    title, caption : text in the mark-up of `study.artifact.markup`; ``{key}`` in a caption stands
+    title, caption : text in the mark-up of `study.artifact.text`; ``{key}`` in a caption stands
         for the value of a setting
     number : number of the figure of the preprint that this one reproduces; None if there is none
     scenes, methods : names in the order of drawing, separated by blanks, as far as the study has

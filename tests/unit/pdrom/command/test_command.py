@@ -28,7 +28,7 @@ from pdrom.core.yamlfile import read_yaml
 from pdrom.model.constraints.base import WeightFactor
 from pdrom.model.dynamics.stepper import FrameReport
 from pdrom.model.effects import EFFECTS, MATERIALS
-from pdrom.model.effects.keyframes import Key
+from pdrom.model.effects.hold import Key
 from pdrom.model.mesh.config import BarMesh, ClothMesh, MeshFile
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.reader import READERS

@@ -1,6 +1,6 @@
 """Captions in light mark-up as TeX; titles as plain words."""
 
-from study.artifact.markup import filled, number, to_plain, to_tex
+from study.artifact.text import filled, number, to_plain, to_tex
 from study.figures.kit.declaration import declarations
 
 CAPTION = "The gain $\\gamma \\le 10^{-3}$ of `block_deim`: 70 % of r_k & more."

@@ -13,9 +13,9 @@ from places import ROOT
 from study.artifact.paths import TABLE
 from study.artifact.reads import TableOf
 from study.tables import declared
+from study.verification.compare import folder_of, read_references, write_reference
 from study.verification.examine import Examination
 from study.verification.files import is_derived
-from study.verification.references import folder_of, read_references, write_reference
 from study.verification.subject import Subject
 
 RESULTS = "results/studies/tiny"

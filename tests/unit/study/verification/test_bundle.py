@@ -8,8 +8,8 @@ import pytest
 
 from pdrom.core.errors import ConfigurationError
 from study.pipeline.folders import Folders
-from study.verification import bundle
-from study.verification.bundle import write_archive
+from study.verification import command
+from study.verification.command import write_archive
 from study.verification.subject import Status, Subject
 
 
@@ -57,7 +57,7 @@ def test_changes_that_are_in_no_commit_are_refused(clone, tmp_path):
 def test_without_a_finished_run_the_command_is_named(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(Subject, "of", lambda *_: Subject(("--configfile", "a.yaml"), Folders()))
-    assert bundle.bundle([]) is Status.MISSING
+    assert command.bundle([]) is Status.MISSING
     assert (
         "a run that succeeds writes it: ./reproduce --configfile a.yaml" in capsys.readouterr().out
     )

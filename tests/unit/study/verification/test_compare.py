@@ -12,8 +12,7 @@ from places import ROOT
 from study.tables import declared
 from study.tables.kit.declaration import TOLERANCES, Table, count, number, shared, text, timed
 from study.tables.kit.results import OWN_ERRORS
-from study.verification.compare import REDUCED_RUN, Comparison, Context, identities
-from study.verification.references import read_references
+from study.verification.compare import REDUCED_RUN, Comparison, Context, identities, read_references
 
 COLUMNS = (
     *shared("scene group method r elements_sampled finite frames relative_error"),

@@ -10,8 +10,7 @@ from pdrom.core.errors import StorageError
 from places import ROOT
 from study.tables import declared
 from study.tables.kit.declaration import WORDS
-from study.verification.compare import Comparison, Context, identifies, kept
-from study.verification.references import read_references
+from study.verification.compare import Comparison, Context, identifies, kept, read_references
 
 FOLDERS = {"full": "results/reference/tables", "tiny": "results/reference/studies/tiny/tables"}
 ROWS = 60  # about as many rows of each table are compared

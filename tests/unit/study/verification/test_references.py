@@ -7,9 +7,9 @@ from pdrom.core.errors import ConfigurationError, StorageError
 from places import ROOT
 from study.tables import declared
 from study.tables.kit.declaration import TOLERANCES
-from study.verification import references
+from study.verification import compare
 from study.verification.command import update
-from study.verification.references import read_references, write_reference
+from study.verification.compare import read_references, write_reference
 from study.verification.subject import Subject
 
 TABLE = declared()["reduced_reruns"]
@@ -28,7 +28,7 @@ def test_a_reference_comes_back_without_times_and_a_large_one_is_packed(
         write_reference(TABLE, frame, tmp_path)
         assert [path.name for path in tmp_path.iterdir()] == [f"reduced_reruns{end}"]
         read.append(read_references(tmp_path)[TABLE.name])
-        monkeypatch.setattr(references, "PACKED_BYTES", 100)
+        monkeypatch.setattr(compare, "PACKED_BYTES", 100)
     lost = dict.fromkeys(set(TABLE.column_names) - set(read[0].columns))
     for reference in read:
         pd.testing.assert_frame_equal(reference.frame, TABLE.checked(frame.assign(**lost)))

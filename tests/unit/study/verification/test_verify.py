@@ -18,8 +18,8 @@ from study.artifact.paths import ARTICLE, TABLE
 from study.figures.kit.declaration import declarations
 from study.tables import declared
 from study.verification.command import status_of, update, verify, verify_tables
+from study.verification.compare import LOG, folder_of
 from study.verification.examine import Examination, Line, Outcome
-from study.verification.references import LOG, folder_of
 from study.verification.subject import Status
 
 RESULTS = "results/studies/tiny"

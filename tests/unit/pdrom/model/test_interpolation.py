@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import nnls
 from scipy.spatial import Delaunay
 
-from pdrom.model.mesh import transfer
+from pdrom.model import coarser
 from pdrom.model.mesh.generators import cloth
 from pdrom.model.mesh.types import Mesh
 
@@ -33,12 +33,12 @@ def test_a_point_inside_has_affine_values_and_one_outside_those_of_the_nearest_p
     mesh, rng, monkeypatch
 ):
     for name, few in (("PAIRS", 500), ("FIRST", 1)):  # the search goes on, in parts
-        monkeypatch.setattr(transfer, name, few)
+        monkeypatch.setattr(coarser, name, few)
     cells = mesh.tetrahedra if len(mesh.tetrahedra) else mesh.triangles
     shares = rng.dirichlet(np.ones(cells.shape[1]), len(cells))
     inside = np.einsum("em,emd->ed", shares, mesh.points[cells])
     outside = rng.uniform(-0.3, 1.3, (12, 3))
-    matrix = transfer.interpolation(mesh, np.vstack([inside, outside]))
+    matrix = coarser.interpolation(mesh, np.vstack([inside, outside]))
     assert (matrix.data >= 0.0).all()
     assert matrix.sum(axis=1) == pytest.approx(1.0, abs=1e-14)
     own = {frozenset(cell) for cell in cells.tolist()}
