@@ -44,8 +44,6 @@ def cost(
 ) -> pd.DataFrame:
     """Compare iterations, coarser meshes and models of a scene by error and time.
 
-    Parameters
-    ----------
     scene : scene made by `build_scene` or `load_scene`
     coarser : meshes with fewer vertices, or their files; without any, a scene on a generated grid
         gets those with a half, a third and a quarter of its cells along a side

@@ -97,8 +97,6 @@ def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: 
 
     ConfigurationError names the key and the fault.
 
-    Parameters
-    ----------
     folder : folder at which a relative path of a mesh file starts
     mesh : a mapping, as in a scene's file; or a pair of arrays: points (N, 3) m with triangles
         (T, 3) or tetrahedra (E, 4) of indices of points, from 0
@@ -166,7 +164,6 @@ def opened(path: Path, what: str, unchecked: bool = False) -> Iterator[h5py.File
 
 
 def _require_consistent(found: Run) -> None:
-    """Raise an error if an array of the run ``found`` is not finite or contradicts its scene."""
     found.require_finite("run")
     points = found.scene.mesh.points
     if np.abs(found.positions[0] - points).max() > 1e-6 * np.abs(points).max():

@@ -121,8 +121,6 @@ class Model:
     ) -> Run:
         """Run ``scene``; a run that blows up ends there and is a result like any other.
 
-        Parameters
-        ----------
         scene : scene with the mesh and the constraint groups of the training; weights, masses,
             forces and the time step may differ; it may hold what a training scene held or declared
         out : file (HDF5) to write; None writes no file

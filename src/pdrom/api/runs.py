@@ -63,8 +63,6 @@ def run(
     Log a warning where held vertices or free vertices at rest lie inside an obstacle, or if frames
     are not converged, and (level INFO) the compilation of kernels, for which a first run waits.
 
-    Parameters
-    ----------
     scene : scene made by `build_scene` or `load_scene`
     out : file (HDF5) to write; None writes no file
     on_frame : called after each frame with its number, from 0, and the solver's report
@@ -150,7 +148,6 @@ def _begun(
 
 
 def _warn_unless_converged(scene: Scene, loop: Stepper) -> None:
-    """Log a warning if frames of a run by ``loop`` are not converged, with a remedy."""
     asked, limit, after, worst = scene.config.iterations, 0.05, "", getattr(loop, "worst", None)
     if isinstance(asked, Until):
         limit, after = asked.error, f" after {asked.most} iterations (most)"

@@ -116,8 +116,6 @@ def train(
 ) -> Model:
     """Train a reduced model of a mesh on one or more runs.
 
-    Parameters
-    ----------
     full : full-order run
     others : further runs on the same mesh, with the same constraint groups
     modes : number of POD modes of the displacements
@@ -274,7 +272,6 @@ def converged_reference(scene: Scene, progress: Progress) -> Run:
 
 
 def _validated(model: Model, training: Sequence[Run], tests: Sequence[Run]) -> Model:
-    """Return ``model`` with the table of its runs of all trajectories."""
     rows = []
     for reference in (*training, *tests):
         log.info("%s: comparing the model with the full order", reference.scene.config.name)

@@ -76,7 +76,6 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
-    """Parse the command line; a misspelt command or option gets a suggestion."""
     top = parser()
     if arguments and arguments[0][:1] != "-" and arguments[0] not in COMMANDS:
         top.error(f"no command '{arguments[0]}'{choices(arguments[0], COMMANDS)}")

@@ -62,7 +62,6 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 
 def _compared(model: "Model", made: "Run", reference: "Run") -> str:
-    """Errors of a run, and the ratio of times measured here."""
     speed = model.speed(made.scene)
     busy = "; unreliable: other programs ran" if speed["busy"] else ""
     return (

@@ -71,7 +71,6 @@ def _cpu_model() -> str:
 
 
 def _commit() -> str:
-    """Git commit of the checkout that contains the package; "unknown" without a checkout."""
     command = ["git", "-C", str(Path(__file__).parent), "rev-parse", "--short=12", "HEAD"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)

@@ -1,8 +1,4 @@
-"""Registries, which map names in configuration files to the code that implements them.
-
-A registry maps each name to a text ``"package.module:attribute"``. The module is imported only when
-the name is used.
-"""
+"""Registries, which map names in configuration files to the code that implements them."""
 
 from collections.abc import Mapping
 from importlib import import_module
@@ -12,7 +8,7 @@ from pdrom.core.errors import ConfigurationError, choices
 
 
 class Registry(dict[str, str]):
-    """Map from a name to its implementation, given as "module:attribute"."""
+    """Map from a name to "module:attribute"; the module is imported only if the name is used."""
 
     def __init__(self, kind: str, entries: Mapping[str, str]) -> None:
         """Store ``entries`` (name -> "module:Class"); ``kind`` names an entry in error messages."""

@@ -153,14 +153,9 @@ class SceneConfig(ConfigModel):
             group: ReductionPlan(train=max(2, min(round(plan.train * frames), even)))
             for group, plan in self.reduce.items()
         }
-        return self.model_copy(
-            update={
-                "mesh": self.mesh.coarsened(resolution),
-                "frames": count,
-                "effects": tuple(e.with_frames_scaled(frames) for e in self.effects),
-                "reduce": plans,
-            }
-        )
+        changes = {"mesh": self.mesh.coarsened(resolution), "frames": count, "reduce": plans}
+        effects = tuple(e.with_frames_scaled(frames) for e in self.effects)
+        return self.model_copy(update=changes | {"effects": effects})
 
     def heldout_variant(self, motion: HeldOutMotion = FIRST) -> Self:
         """Configuration of the scene with the held-out ``motion`` (see `HeldOut`)."""
@@ -220,16 +215,9 @@ class Scene:
             except SceneError as error:
                 where = f"scene '{config.name}', effect '{entry.effect}'"
                 raise SceneError(f"{where}: {error}") from error
-        scene = cls(
-            config,
-            mesh,
-            masses,
-            groups=[e for e in effects if isinstance(e, ConstraintGroup)],
-            forces=[e for e in effects if isinstance(e, base.Force)],
-            boundaries=[e for e in effects if isinstance(e, base.Boundary)],
-            contacts=[e for e in effects if isinstance(e, base.Contact)],
-            starts=[e for e in effects if isinstance(e, base.Start)],
-        )
+        kinds = (ConstraintGroup, base.Force, base.Boundary, base.Contact, base.Start)
+        lists: list[Any] = [[e for e in effects if isinstance(e, kind)] for kind in kinds]
+        scene = cls(config, mesh, masses, *lists)
         scene._check_holds()
         for force in scene.forces:
             force.time_step = config.time_step

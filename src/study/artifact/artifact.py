@@ -93,7 +93,6 @@ class Artifact:
         return {name: TypeAdapter(hints[name]) for name in settings}
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
-        """Call the artifact's function with these arguments and return its result."""
         return self.function(*arguments, **named)
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:

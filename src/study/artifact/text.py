@@ -75,7 +75,6 @@ def replaced(text: str) -> str:
 
 
 def _typeset(character: str) -> str | None:
-    """TeX code of ``character``; None if it cannot be typeset."""
     if character in _SPECIAL:
         return _SPECIAL[character]
     if " " <= character <= "~" or character in _PUNCTUATION:

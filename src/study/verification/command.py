@@ -25,8 +25,7 @@ from study.pipeline.unfit import faults
 from study.tables import declared
 from study.verification.compare import LOG, folder_of, note, write_reference
 from study.verification.examine import GOOD, Examination, Line, Outcome
-from study.verification.files import verify_files
-from study.verification.subject import Status, Subject, options_parser, say
+from study.verification.subject import Status, Subject, options_parser, say, verify_files
 
 EXIT_CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
 PAGE = "verification.md"

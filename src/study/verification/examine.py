@@ -18,8 +18,7 @@ from study.tables.claims.claims import RULES, timed_columns
 from study.tables.claims.rules import load_claims
 from study.verification import compare
 from study.verification.compare import Reference, folder_of, read_references
-from study.verification.files import differing, is_derived
-from study.verification.subject import Subject
+from study.verification.subject import Subject, differing, is_derived
 
 # Columns of the table claims with verdicts, and their names in messages.
 VERDICTS = {"verdict": "as published", "verdict_beyond": "beyond"}
@@ -154,7 +153,6 @@ class Examination:
         return [_claim(str(name), expected, found) for name in names]
 
     def _missing(self, name: str, paths: Iterable[str]) -> str:
-        """Text about the first of the ``paths`` that is not intact, with a command."""
         lost = next((path for path in paths if not self.intact(path)), None)
         how = self.subject.command(name)
         return f"{lost} is not there or damaged; make it by {how}" if lost else ""
@@ -175,7 +173,6 @@ class Examination:
 
 
 def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
-    """Compare the verdicts on claim ``name`` in the expected and the found table of claims."""
     if name not in expected.index or name not in found.index:
         text = "the claim is new" if name in found.index else "the claim is gone"
         return Line("claim", name, Outcome.DIFFERS, text)

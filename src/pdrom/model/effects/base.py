@@ -4,16 +4,11 @@ A scene is a mesh and a list of effects. Each effect is a class with a typed con
 by the name that scene files use. An effect has exactly one role, which determines what the step
 loop uses of it:
 
-=============  ===================================================  =========================
-role           result that the step loop uses                       examples
-=============  ===================================================  =========================
-`Start`        initial velocity                                     kick, velocity
-`Force`        acceleration of the frame                            gravity, wind
-`Boundary`     held (prescribed) vertices and their positions       pins, translate, poke
-`Contact`      correction of the end-of-frame positions             floor, sphere
-constraint     local projection and its operator                    spring, strain (in
-group                                                               `pdrom.model.constraints`)
-=============  ===================================================  =========================
+`Start` : initial velocity (kick, velocity)
+`Force` : acceleration of the frame (gravity, wind)
+`Boundary` : held (prescribed) vertices and their positions (pins, translate, poke)
+`Contact` : correction of the end-of-frame positions (floor, sphere)
+constraint group : local projection and its operator (spring, strain; `pdrom.model.constraints`)
 """
 
 from abc import ABC, abstractmethod
@@ -32,11 +27,9 @@ from pdrom.model.mesh.types import Length, Mesh
 TOUCHING = 1e-6
 
 
-class ScaledWithFrames:
-    """Marker of configuration fields that scale with the number of frames of a scene."""
-
-
-FrameNumber = Annotated[int, Field(ge=0, le=1_000_000), ScaledWithFrames()]
+# Marker of configuration fields that scale with the number of frames of a scene.
+SCALED = "scaled with frames"
+FrameNumber = Annotated[int, Field(ge=0, le=1_000_000), SCALED]
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Vector = tuple[Length, Length, Length]
 
@@ -51,10 +44,10 @@ class EffectConfig(ConfigModel):
         changes: dict[str, Any] = {}
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
-            # in type ``FrameNumber | None`` the marker `ScaledWithFrames` is inside the union
+            # in type ``FrameNumber | None`` the marker is inside the union
             inside = getattr(field.annotation, "__args__", ())
             nested = [m for part in inside for m in getattr(part, "__metadata__", ())]
-            if value and any(isinstance(m, ScaledWithFrames) for m in (*field.metadata, *nested)):
+            if value and SCALED in (*field.metadata, *nested):
                 changes[name] = max(1, round(value * factor))
         return self.model_copy(update=changes)
 
@@ -89,7 +82,6 @@ class Effect(ABC):
     """An effect bound to a mesh. ``Config`` is the typed configuration of the class."""
 
     Config: type[EffectConfig]
-
     in_subspace: ClassVar[bool] = True
     """Whether the effect is supported in a position subspace (an error is raised otherwise)."""
 
@@ -116,7 +108,6 @@ class Force(Effect):
 
     time_step: float
     """Time step h of the run in seconds, set by the scene; some forces depend on it."""
-
     rate: float | np.ndarray | None = None
     """Rate c, a number or (N,) 1/s, if the acceleration is -c v plus a term that does not depend on
     positions or velocities; None for any other force."""
@@ -138,10 +129,8 @@ class Boundary(Effect):
 
     vertices: np.ndarray
     """All vertices that the effect holds in any frame, ascending (n,) int64."""
-
     side: str | None = None
     """Name of the side of the rest shape if the vertices were selected by one; else None."""
-
     moves: bool
     """Whether the targets change from frame to frame."""
 
@@ -185,7 +174,6 @@ class Contact(Effect):
 
     each_alone: ClassVar[bool] = True
     """Whether the correction of a vertex does not depend on other vertices."""
-
     height: float | None = None
     """Height y, m, for a floor: a contact that only moves lower vertices up to y; else None."""
 

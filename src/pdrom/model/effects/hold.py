@@ -180,12 +180,10 @@ class Keyframes(Hold):
             return scaled.model_copy(update={"keys": tuple(keys)})
 
         def redirected(self, axes: Sequence[int]) -> Self:
-            keys = [
-                key.model_copy(
-                    update={name: tuple(-x for x in getattr(key, name)) for name in POSE}
-                )
-                for key in self.keys
-            ]
+            keys = []
+            for key in self.keys:
+                back = {name: tuple(-x for x in getattr(key, name)) for name in ("offset", "turn")}
+                keys.append(key.model_copy(update=back))
             return self.model_copy(update={"keys": tuple(keys)})
 
     moves = True
@@ -210,9 +208,6 @@ class Keyframes(Hold):
         middle = 0.5 * (anchor.min(axis=0) + anchor.max(axis=0))
         rotation = Rotation.from_rotvec(turn, degrees=True)
         return middle + rotation.apply(anchor - middle) + offset
-
-
-POSE = ("offset", "turn")
 
 
 # displacements, divided by the amplitude, at equally spaced times

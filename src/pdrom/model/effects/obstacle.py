@@ -181,7 +181,7 @@ class Box(Obstacle):
     def normals(self, points: np.ndarray) -> np.ndarray:
         """Return normals (n, 3) of the faces nearest to ``points``; ties: the first face."""
         face = self._to_faces(points).argmin(axis=1)
-        return _axis_vectors(face % 3, np.where(face < 3, -1.0, 1.0))
+        return np.eye(3)[face % 3] * np.where(face < 3, -1.0, 1.0)[:, None]
 
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
         """Return the `Entries` of straight paths from ``start`` to ``end`` (n, 3) m.
@@ -205,12 +205,7 @@ class Box(Obstacle):
         hits = (moved != 0.0) & on_face & (fraction <= 1.0) & (far.min(axis=1) >= fraction)
         points = start + np.clip(np.where(hits, fraction, 0.0), 0.0, None)[:, None] * path
         points[rows, axis] = near_face[rows, axis]
-        return hits, points, _axis_vectors(axis, -np.sign(moved))
-
-
-def _axis_vectors(axes: np.ndarray, signs: np.ndarray) -> np.ndarray:
-    """Return unit vectors (n, 3) along the ``axes`` (n,), 0, 1 or 2, times ``signs`` (n,)."""
-    return np.eye(3)[axes] * signs[:, None]
+        return hits, points, np.eye(3)[axis] * -np.sign(moved)[:, None]
 
 
 RINGS = 24  # intervals of a drawn sphere from pole to pole; there are twice as many around it

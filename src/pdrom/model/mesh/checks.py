@@ -98,7 +98,6 @@ def check_range(points: np.ndarray, scale: float, name: str) -> None:
 
 
 def _check_neighbours(cells: np.ndarray, kind: str, name: str) -> None:
-    """Raise MeshError for a repeated cell, or an edge or face of more than two cells."""
     twice = _largest_group(np.sort(cells, axis=1))
     if len(twice) > 1:
         first, again = twice[:2]

@@ -191,7 +191,6 @@ def _cells(source: raw.Source, kind: int, count: int, size: int, offsets: bool) 
 
 
 def _joined(parts: list[raw.Found]) -> raw.Found:
-    """Return the content of ``parts`` one after another."""
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
     each = [part._replace(corners=part.corners + n) for part, n in zip(parts, starts, strict=False)]
     return raw.Found(*(np.concatenate(arrays) for arrays in zip(*each, strict=True)))
@@ -221,7 +220,6 @@ def vtu(content: bytes) -> raw.Found:
 
 
 def _piece(piece: ElementTree.Element, read: Callable[..., np.ndarray]) -> raw.Found:
-    """Return the content of a ``piece``, whose arrays ``read`` reads."""
     points, cells = int(piece.get("NumberOfPoints", 0)), int(piece.get("NumberOfCells", 0))
     positions = read(piece.find("Points/DataArray"), 3 * points).reshape(-1, 3)
     arrays = {array.get("Name"): array for array in piece.iterfind("Cells/DataArray")}

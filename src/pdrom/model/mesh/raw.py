@@ -119,7 +119,6 @@ class Source:
     """
 
     def __init__(self, content: bytes, order: str, start: int = 0) -> None:
-        """Begin at byte ``start``."""
         self.order, self.content, self._next = order, content, start
         if not order and b"\r" in content:
             self.content, self._next = unified(content[start:]), 0
@@ -204,7 +203,6 @@ class Source:
         return np.dtype([(f"f{i}", *kind) for i, kind in enumerate(kinds)])
 
     def _there(self, fields: Sequence[Field]) -> int:
-        """Return how many rows are there."""
         if not self.order and self._at == len(self._numbers):
             word = _WORD.search(self.content, self._next)
             end = word.start() if word else len(self.content)

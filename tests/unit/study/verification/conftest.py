@@ -15,8 +15,7 @@ from study.artifact.reads import TableOf
 from study.tables import declared
 from study.verification.compare import folder_of, read_references, write_reference
 from study.verification.examine import Examination
-from study.verification.files import is_derived
-from study.verification.subject import Subject
+from study.verification.subject import Subject, is_derived
 
 RESULTS = "results/studies/tiny"
 

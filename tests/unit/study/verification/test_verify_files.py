@@ -21,8 +21,7 @@ from study.pipeline.folders import Folders
 from study.pipeline.manifest import read_manifest, write_manifest
 from study.pipeline.plan import Job
 from study.tables import declared
-from study.verification.files import differing, verify_files
-from study.verification.subject import Status, Subject
+from study.verification.subject import Status, Subject, differing, verify_files
 
 NAMES = ("results/tables/a.csv", "results/fom/a/train.h5", "paper/main.pdf", "results/paper/m.tex")
 OPTIONS = ("--configfile", "my study.yaml")
