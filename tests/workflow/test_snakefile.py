@@ -190,8 +190,8 @@ def test_no_text_and_no_date_reruns_anything(finished):
     finished.edit(SPRING, '"""Edge springs:', '"""Springs along edges:')
     finished.edit(SPRING, "    # edges are scaled, so that ", "    # edges are divided, so that ")
     finished.edit(SCRIPT, "    make(", "    # the job\n    make(")
-    unlisted = "src/pdrom/model/effects/self_collision.py"
-    finished.edit(unlisted, "if sweep == 0:", "if sweep <= 0:")
+    poke = "src/pdrom/model/effects/poke.py"
+    finished.edit(poke, "self._order[turn : ", "self._order[0 + turn : ")
     finished.edit("src/pdrom/model/effects/__init__.py", "    {\n", ENTRY)
     finished.register(*SELECTION)
     for late in (EDITED, ("results",)):

@@ -20,7 +20,7 @@ EFFECTS = Registry(
         "translate": "pdrom.model.effects.hold:Translate",
         "rotate": "pdrom.model.effects.hold:Rotate",
         "keyframes": "pdrom.model.effects.hold:Keyframes",
-        "poke": "pdrom.model.effects.hold:Poke",
+        "poke": "pdrom.model.effects.poke:Poke",
         "bending": "pdrom.model.constraints.bending:VertexBending",
         "spring": "pdrom.model.constraints.spring:EdgeSpring",
         "strain": "pdrom.model.constraints.triangle_strain:TriangleStrain",
