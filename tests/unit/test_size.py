@@ -11,11 +11,11 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 36_075,
-    "lines of tests": 23_160,
-    "words of documentation": 25_700,
+    "lines of src": 33_920,
+    "lines of tests": 21_000,
+    "words of documentation": 20_050,
     "tables": 27,
-    "figures": 23,
+    "figures": 22,
     "experiments": 20,
 }
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "docs/**/*.md")

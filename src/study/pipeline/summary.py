@@ -7,11 +7,12 @@ The columns of the tables follow.
 import shlex
 import time
 from contextlib import suppress
+from pathlib import Path
 
 import psutil
 from snakemake.utils import available_cpu_count
 
-from pdrom.core.store import read_table
+from pdrom.core.store import Condition, check_file, read_table
 from study.artifact import paths
 from study.figures.kit.declaration import declarations
 from study.pipeline.commandline import CommandLine
@@ -58,9 +59,11 @@ def summary(command: CommandLine, plan: Plan) -> str:
     if command.targets:
         lines.append(f"made: {', '.join(command.targets)}")
     else:
-        if "claims" in plan.tables:
-            claims = read_table(paths.TABLE.at(folders.results, name="claims")).itertuples()
-            said = [f"{row.claim} {row.verdict} / {row.verdict_beyond}" for row in claims]
+        claims = paths.TABLE.at(folders.results, name="claims")
+        # a damaged file is only left out here: the next run makes it again
+        if Path(claims).is_file() and check_file(claims) is Condition.INTACT:
+            rows = read_table(claims).itertuples()
+            said = [f"{row.claim} {row.verdict} / {row.verdict_beyond}" for row in rows]
             lines.append(f"verdicts (as published / beyond): {', '.join(said)}")
         lines.append(f"manuscript: {', '.join(folders.documents.values())}")
         lines.append(f"as pages: {paths.ARTICLE.at(folders.results, name='index.html')}")
