@@ -11,7 +11,7 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 33_920,
+    "lines of src": 33_940,
     "lines of tests": 21_000,
     "words of documentation": 20_050,
     "tables": 27,

@@ -13,7 +13,7 @@ import numpy as np
 
 from pdrom.core.store import write_hdf5
 from pdrom.model.compiled.rows import flat
-from pdrom.model.constraints.local_kernel import table_of
+from pdrom.model.constraints.local_kernel import PythonKernel, table_of
 from pdrom.model.dynamics.acceleration import minimise
 from pdrom.model.dynamics.convergence import EstimatingStepper, frame_error
 from pdrom.model.dynamics.space import VertexSpace
@@ -61,7 +61,12 @@ class ConvergedStepper(Stepper):
         super().__init__(scene.space(system), scene.config.time_step, limit, scene.groups)
         self.space: VertexSpace
         self._from_last = from_last
-        self._table = table_of([local.local_kernel for local in self.local_steps])
+        self._kernels = [
+            getattr(local, "local_kernel", None)
+            or PythonKernel(local.accumulate, scene.mesh.vertices)
+            for local in self.local_steps
+        ]
+        self._table = table_of(self._kernels)
         self.tolerance, self.converged = tolerance * scene.mesh.extent, True
         self.changes: list[float] = []
         self.evaluations: list[int] = []

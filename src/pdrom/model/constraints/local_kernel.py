@@ -4,7 +4,8 @@ A local kernel reads its data from a record (an array of addresses and numbers),
 can call any combination of constraint groups and reduced local steps.
 """
 
-from collections.abc import Sequence
+import ctypes
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numba import types
@@ -103,7 +104,24 @@ class LocalKernel:
         return _call(self.address, numbers.ctypes.data, out.ctypes.data, self.record.ctypes.data)
 
 
-def table_of(kernels: Sequence[LocalKernel]) -> Table:
+class PythonKernel:
+    """Local step without compiled code, which compiled loops call by address as a `LocalKernel`.
+
+    ``accumulate`` maps y and rhs (``vertices``, 3) to the energy, J, and changes rhs.
+    """
+
+    def __init__(self, accumulate: Callable[..., float], vertices: int) -> None:
+        def call(y: int, rhs: int, _: int) -> float:
+            numbers = ctypes.c_double * (rows.WIDTH * vertices)
+            found = (np.ctypeslib.as_array(numbers.from_address(place)) for place in (y, rhs))
+            return accumulate(*(each.reshape(vertices, -1)[:, :3] for each in found))
+
+        self._call = ctypes.CFUNCTYPE(ctypes.c_double, *3 * [ctypes.c_ssize_t])(call)
+        self.address = ctypes.cast(self._call, ctypes.c_void_p).value
+        self.record = np.array([vertices], dtype=np.int64)
+
+
+def table_of(kernels: Sequence[LocalKernel | PythonKernel]) -> Table:
     """Return the addresses of ``kernels``, which are valid as long as these objects exist."""
     addresses = np.array([kernel.address for kernel in kernels], dtype=np.int64)
     records = np.array([kernel.record.ctypes.data for kernel in kernels], dtype=np.int64)

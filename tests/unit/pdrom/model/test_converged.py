@@ -1,5 +1,7 @@
 """The limit K -> infinity: L-BFGS against very many iterations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,3 +46,26 @@ def test_a_frame_ends_where_very_many_iterations_end(group, rng):
     assert best.converged
     assert max(best.evaluations) < 500
     assert best.evaluations != other.evaluations  # their frames start from different positions
+
+
+class WithoutKernel:
+    """A group whose local step is Python."""
+
+    def __init__(self, group) -> None:
+        self.name, self._group = group.name, group
+
+    def begin_frame(self, q: np.ndarray) -> None:
+        """Nothing is frozen."""
+
+    def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
+        return self._group.accumulate(y, rhs)
+
+
+def test_a_group_without_compiled_code_converges_to_the_same_frame(rng):
+    scene = sheet("strain")
+    python = replace(scene, groups=[WithoutKernel(group) for group in scene.groups])
+    loops = [ConvergedStepper(each, scene.system, 1e-9, 500) for each in (scene, python)]
+    state = scene.initial_state(0.02 * rng.standard_normal(scene.mesh.points.shape))
+    compiled, plain = (loop.step(state, 0)[0].positions for loop in loops)
+    np.testing.assert_array_equal(compiled, plain)
+    assert loops[0].evaluations == loops[1].evaluations != [1]
