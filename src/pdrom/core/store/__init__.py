@@ -197,7 +197,8 @@ def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
         with h5py.File(memory, "w", track_order=True, userblock_size=sums.BLOCK) as file:
             file.attrs.update(attributes())
             yield file
-        temporary.write_bytes(memory.getbuffer())
+        with memory.getbuffer() as content:
+            temporary.write_bytes(content)
         sums.write_block(temporary, path)
 
 

@@ -164,7 +164,7 @@ NOTHING = {  # effects, frames, group, message
     "all carried": ([GRAVITY, CARRIED], 8, None, "nothing moves: 0 free"),
     "flat": ([GRAVITY, LEFT, BENDING], 8, "bending", "'bending': .* rank 0 .* nothing to reduce"),
     "rigid": ([GRAVITY], 8, "spring", "'spring': its projections, .* change by at most"),
-    "one frame": ([GRAVITY, LEFT], 1, "spring", "a run of one or two frames has one snapshot"),
+    "one frame": ([GRAVITY, LEFT], 1, "spring", "one or two frames have one snapshot"),
 }
 
 
