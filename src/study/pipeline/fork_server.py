@@ -64,20 +64,18 @@ def run_script(script: str) -> None:
         raise subprocess.CalledProcessError(status, script)
 
 
-def _started(script: str) -> Any:
+def _started(script: str, attempts: int = ATTEMPTS) -> Any:
     """Start a process that runs ``script``; another server takes the place of one that has died."""
-    for attempt in range(ATTEMPTS):
-        job = cast(Any, multiprocessing.get_context(METHOD)).Process(
-            target=_run_as_main, args=[script]
-        )
-        try:
-            job.start()
-            return job
-        except (EOFError, OSError):  # a server that was just killed is not yet seen as ended
-            if attempt == ATTEMPTS - 1:
-                raise
-            time.sleep(0.1)
-    return None
+    context = cast(Any, multiprocessing.get_context(METHOD))
+    job = context.Process(target=_run_as_main, args=[script])
+    try:
+        job.start()
+    except (EOFError, OSError):  # a server that was just killed is not yet seen as ended
+        if attempts == 1:
+            raise
+        time.sleep(0.1)
+        return _started(script, attempts - 1)
+    return job
 
 
 def _run_as_main(script: str) -> None:

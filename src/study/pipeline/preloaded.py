@@ -1,4 +1,4 @@
-"""What the fork server loads before it forks jobs: an import of this module loads it.
+"""Load libraries before the fork server forks jobs; an import of this module does so.
 
 These are libraries that most jobs or all figures use, modules that every job imports first, and the
 modules of the experiment with the most jobs.

@@ -197,8 +197,8 @@ def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
         with h5py.File(memory, "w", track_order=True, userblock_size=sums.BLOCK) as file:
             file.attrs.update(attributes())
             yield file
-        with memory.getbuffer() as content:
-            temporary.write_bytes(content)
+        with temporary.open("wb") as target:
+            target.write(memory.getbuffer())
         sums.write_block(temporary, path)
 
 
