@@ -1,6 +1,6 @@
 r"""Conversion of the manuscript's source to LaTeX that pandoc can read, with numbers as links.
 
-Commands that TeX would evaluate are replaced here by their results: ``\val``, ``\known``, ``\row``,
+Commands that TeX would evaluate are replaced here by their results: ``\n``, ``\known``, ``\row``,
 ``\ifpart``, captions of figures. A number becomes a link to ``origin:KEY``, where KEY names a
 table and rows, in hexadecimal.
 """
@@ -13,7 +13,8 @@ import pandas as pd
 
 from study.artifact.text import escape
 from study.paper.build import Facts
-from study.paper.macros import SHOWN, VAL, closing, matching, sentences
+from study.paper.macros import SHOWN, closing, sentences
+from study.paper.numbers import NAMED, matching
 from study.paper.source import COMMENT, PLACED
 from study.paper.textables import Rows, tabular
 
@@ -34,7 +35,7 @@ _FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end
 # Finds one-line definitions of TeX commands and theorems in the preamble; pandoc can read these.
 # Definitions of layout commands are left out: `REPLACED` has simple ones of the same commands.
 _SHORT = re.compile(
-    r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile|pictureof|val|known|row)\w+\}.*\}|newtheorem.*)$"
+    r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile|pictureof|n|known|row)\w+\}.*\}|newtheorem.*)$"
 )
 REPLACED = r"""
 \newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
@@ -59,8 +60,10 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
     for name, words in {"configuration": facts.part or full, "fullstudy": full}.items():
         shown = rf"\texttt{{{escape(words)}}}".replace("\\", r"\\")
         text = re.sub(rf"\\{name}(?![A-Za-z])(?:\{{\}})?", shown, text)
-    text = VAL.sub(
-        lambda found: _link(found[1], origins["numbers"][found[1]]["text"]), _MATH.sub(_apart, text)
+    numbers = origins["numbers"]
+    text = NAMED.sub(
+        lambda found: _link(numbers[found[1]]["key"], numbers[found[1]]["text"]),
+        _MATH.sub(_apart, text),
     )
     text = _DROPPED.sub("", text.replace("{fittedtabular}", "{tabular}"))
     short = [found[0] for found in _SHORT.finditer(preamble)]
@@ -85,11 +88,11 @@ def _decided(source: str, known: Sequence[str]) -> str:
 
 
 def _apart(found: re.Match[str]) -> str:
-    """Split a formula at its numbers (``\\val``), as a link cannot stand inside a formula."""
-    if not VAL.search(found[1]):
+    """Split a formula at its numbers (``\\n``), as a link cannot stand inside a formula."""
+    if not NAMED.search(found[1]):
         return found[0]
-    parts = re.split(r"(\\val\{[^{}]*\})", found[1])
-    return "".join(p if p.startswith(r"\val") else f"${p.strip()}$ " for p in parts if p.strip())
+    parts = re.split(r"(\\n\{[^{}]*\})", found[1])
+    return "".join(p if p.startswith(r"\n{") else f"${p.strip()}$ " for p in parts if p.strip())
 
 
 def _link(key: str, text: str) -> str:

@@ -1,6 +1,7 @@
 """Artifacts of the manuscript: files that its source includes (numbers, tables ...), and PDFs."""
 
 import json
+import logging
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -24,12 +25,23 @@ from study.artifact.reads import Every, ProjectFile, Setting, SourcesOf
 from study.artifact.text import replaced
 from study.experiments.machine import Record
 from study.figures.kit.declaration import declarations
-from study.paper.macros import HIDDEN, captions, decisions, keys_of, macros, number_of, provenance
+from study.paper.macros import decisions, defined, provenance
+from study.paper.numbers import (
+    HIDDEN,
+    NUMBERS_FILE,
+    Entries,
+    entries,
+    names_of,
+    number_of,
+    unexpected,
+)
 from study.paper.source import DOCUMENTS, documents
 from study.paper.tex import build_pdfs
 from study.paper.textables import TEX_TABLES, reads, tex_table
 from study.tables import declared
 from study.tables.effects_cost import unreliable
+
+log = logging.getLogger(__name__)
 
 PAGES = {"main": 16, "supplement": 30}  # largest allowed number of pages of each document
 
@@ -60,7 +72,7 @@ def write_inputs(
     r"""Write macros.tex, figures.tex, TeX tables, bibliographies and the file `NUMBERS`.
 
     ``made`` are the rules of all tables, figures and pages. `NUMBERS` (JSON) has the table cells
-    from which the number of each ``\val`` key is computed, the tables from which each TeX table is
+    from which each number ``\n`` is computed, the tables from which each TeX table is
     made, and which ``\known`` and ``\row`` blocks are shown.
     """
     texts = documents(source[0].parent)
@@ -70,21 +82,40 @@ def write_inputs(
         declared()[name].checked(frame.reindex(columns=declared()[name].column_names))
     data |= fact_tables(Path(machine.path), facts)
     drawn = [name for name, figure in declarations().items() if figure.rule in made]
-    decided = {document: decisions(text, data, drawn) for document, text in texts.items()}
+    asked = entries(source[0].parent)
+    decided = {document: decisions(text, asked, data, drawn) for document, text in texts.items()}
+    _require_expected(asked, data, facts)
+    numbers = {name: number_of(name, asked, data) for name in names_of(whole)}
     known = provenance(decided, facts.part, facts.full_study, times)
-    written = {"macros": macros(whole, data) + known, "figures": captions(facts.captions)}
+    texts_of_numbers = {name: number.text for name, number in numbers.items()}
+    written = {"macros": defined("n", texts_of_numbers) + known}
+    written["figures"] = defined("caption", facts.captions)
     written |= {name: tex_table(name, data) for name in TEX_TABLES if name in outputs}
     for document, text in texts.items():
         written[document] = bibliography(text, references)
     origins = {
         "known": decided,
-        "numbers": {key: number_of(key, data)._asdict() for key in keys_of(whole)},
+        "numbers": {name: number._asdict() for name, number in numbers.items()},
         "tables": {name: reads(name) for name in TEX_TABLES if name in outputs},
         "times": times,
     }
     written[Path(NUMBERS).stem] = json.dumps(origins, indent=1, allow_nan=False) + "\n"
     for name, content in written.items():
         write_text(content, outputs[name])
+
+
+def _require_expected(asked: Entries, tables: Mapping[str, pd.DataFrame], facts: Facts) -> None:
+    """Raise PaperError if a number is not what the text takes for granted.
+
+    Only the full study's numbers are; those that depend on times may differ on other machines, so
+    that they only lead to a warning.
+    """
+    for name, found in unexpected(asked, tables).items() if facts.part is None else ():
+        entry = asked[name]
+        timed = declared()[entry.table].timing_columns if entry.table in declared() else ()
+        if entry.column not in timed:
+            raise PaperError(f"{NUMBERS_FILE}: {name}: {found}; change the sentence that cites it")
+        log.warning("%s: %s: %s; times of this machine do not fit the text", NUMBERS_FILE, name, found)
 
 
 TIMES = (

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from pdrom.core.errors import PaperError
+from study.paper.numbers import NUMBERS_FILE
 
 DOCUMENTS = ("main", "supplement")
 SUPPLEMENT = "S"  # prefix of the figure numbers in the supplement
@@ -46,13 +47,13 @@ def figure_numbers(root: Path) -> dict[str, str]:
 
 
 def source_files(root: Path, own: bool = False) -> list[str]:
-    """Paths of the manuscript's TeX files, relative to ``root``: documents, preamble, sections.
+    """Paths of the manuscript's files, relative to ``root``: documents, preamble, numbers, sections.
 
     If ``own``, the documents are the short ones about a user's own scenes, without section files.
     """
     folder = root / "paper"
     files = [(root / OWN if own else folder) / f"{name}.tex" for name in DOCUMENTS]
-    files.append(folder / "preamble.tex")
+    files += [folder / "preamble.tex", folder / NUMBERS_FILE]
     for below in () if own else ("sections", "supplement"):
         files += sorted((folder / below).glob("*.tex"))
     return [path.relative_to(root).as_posix() for path in files]

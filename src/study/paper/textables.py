@@ -14,7 +14,7 @@ from study.artifact.text import escape
 from study.experiments.alternatives.experiment import NEWTON
 from study.experiments.error_budget import PARTS
 from study.figures.kit.declaration import declarations
-from study.paper.macros import format_number
+from study.paper.numbers import format_number
 from study.tables.claims.claims import NOT_DECIDED
 from study.tables.equal_error import AHEAD, REDUCED, SAME
 from study.tables.kit.results import FAILED, MEASURES, MEDIAN, over_motions, trained

@@ -31,7 +31,7 @@ from study.article.latex import linked_table
 from study.artifact.paths import File
 from study.experiments.machine import Record, Units
 from study.paper import build, textables
-from study.paper.macros import AGGREGATES, MISSING, format_number, matching
+from study.paper.numbers import AGGREGATES, MISSING, format_number, matching
 from study.paper.source import documents, figure_numbers
 from study.paper.tex import find_pdflatex, packages_of
 

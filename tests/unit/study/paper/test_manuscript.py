@@ -11,7 +11,8 @@ from pdrom.core.yamlfile import read_yaml
 from places import ROOT
 from study.figures.kit.declaration import declarations
 from study.paper.build import bibliography, paper
-from study.paper.macros import keys_of, number_of, sentences
+from study.paper.macros import sentences
+from study.paper.numbers import entries, names_of, number_of
 from study.paper.source import documents, figure_numbers
 from study.paper.tex import build_pdfs, packages_of
 from study.paper.textables import TEX_TABLES
@@ -23,6 +24,7 @@ SOURCES = documents(ROOT / "paper")
 PAPER = SOURCES["main"]
 SOURCE = "".join(SOURCES.values())
 OWN = documents(ROOT / "paper" / "own")
+NUMBERS = entries(ROOT / "paper")
 
 # What may hold digits without stating a result: mathematics, keys, lengths, names of claims.
 _NOT_PROSE = [
@@ -30,7 +32,7 @@ _NOT_PROSE = [
     r"\\begin\{(equation|align)\*?\}.*?\\end\{\1\*?\}",
     r"(?s:\\begin\{(theorem|proposition)\}.*?\\end\{\1\})",
     r"(?s:\\emph\{Proof\.\}.*?\\proven)",
-    r"\\(val|cite|label|ref|eqref|input|includegraphics|scene|method|source|figureof|fontsize)"
+    r"\\(n|cite|label|ref|eqref|input|includegraphics|scene|method|source|figureof|fontsize)"
     r"(\[[^\]]*\])?\{[^{}]*\}",
     r"\\multicolumn\{\d\}|\\cline\{\d-\d\}",
     r"\\(setlength|vspace|hspace)\{[^{}]*\}(\{[^{}]*\})?",
@@ -78,8 +80,8 @@ def test_the_text_of_other_scenes_speaks_of_what_it_shows_and_of_no_claim():
     assert set(re.findall(r"\\ref\{tab:(\w+)\}", source)) == tables != set()
     for text in OWN.values():
         assert r"\bibitem" in bibliography(text, ROOT / "paper" / "references.bib")
-        for key in keys_of(text):
-            assert key.split("|")[0] in ("study", "scenes", "methods", "machine")
+        for name in names_of(text):
+            assert NUMBERS[name].table in ("study", "scenes", "methods", "machine")
 
 
 def test_a_study_of_other_scenes_has_its_own_text():
@@ -113,14 +115,15 @@ def test_only_packages_of_both_tex_systems():
     assert set(packages_of(SOURCE)) <= allowed
 
 
-def test_every_key_names_a_column_of_a_table():
+def test_every_number_is_a_column_of_a_table_and_is_cited():
     study = Study(read_yaml(ROOT / "config" / "default.yaml"), ROOT)
     facts = Plan(study).job(paper).settings["facts"]["tables"]
     tables = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
     tables |= {name: pd.DataFrame(rows)[:0] for name, rows in facts.items()}
-    for key in keys_of(SOURCE):
-        if not key.startswith("machine|"):
-            number_of(key, tables)  # which refuses others
+    for name, entry in NUMBERS.items():
+        if entry.table != "machine":
+            number_of(name, NUMBERS, tables)  # which refuses others
+    assert set(names_of(SOURCE + "".join(OWN.values()))) == set(NUMBERS)
 
 
 def test_every_figure_of_the_study_is_shown_or_named_and_the_text_speaks_of_what_it_shows():
@@ -144,10 +147,10 @@ def test_numbers_that_a_configuration_may_lack_stand_in_sentences_that_can_be_le
     outside = SOURCE
     for block in blocks:
         outside = outside.replace(rf"\known{{{block}}}", "").replace(rf"\row{{{block}}}", "")
-    for key in keys_of(outside):
-        table = key.split("|")[0]
-        assert table in ("study", "claims", "machine") or re.fullmatch(r"scenes\|\w+\|max", key)
-    assert all(keys_of(block) for block in blocks)
+    for entry in map(NUMBERS.__getitem__, names_of(outside)):
+        always = entry.table in ("study", "claims", "machine")
+        assert always or (entry.table == "scenes" and entry.take == "max")
+    assert all(names_of(block) for block in blocks)
 
 
 def test_the_same_inputs_give_the_same_bytes_in_every_folder(tmp_path):
