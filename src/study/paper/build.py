@@ -43,7 +43,7 @@ from study.tables.effects_cost import unreliable
 
 log = logging.getLogger(__name__)
 
-PAGES = {"main": 16, "supplement": 30}  # largest allowed number of pages of each document
+PAGES = {"main": 20, "supplement": 40}  # largest allowed number of pages of each document
 
 
 class Facts(BaseModel):
@@ -115,7 +115,9 @@ def _require_expected(asked: Entries, tables: Mapping[str, pd.DataFrame], facts:
         timed = declared()[entry.table].timing_columns if entry.table in declared() else ()
         if entry.column not in timed:
             raise PaperError(f"{NUMBERS_FILE}: {name}: {found}; change the sentence that cites it")
-        log.warning("%s: %s: %s; times of this machine do not fit the text", NUMBERS_FILE, name, found)
+        log.warning(
+            "%s: %s: %s; times of this machine do not fit the text", NUMBERS_FILE, name, found
+        )
 
 
 TIMES = (

@@ -48,7 +48,7 @@ class Entry(ConfigModel):
     rows : column -> value, or several, of rows that are taken; "!=x" takes rows with another than x
     take : what is taken of several cells: their largest, smallest, median, or number (of all,
         or of different ones)
-    digits : significant digits
+    digits, percent : significant digits, and whether the number is shown times a hundred
     expect : what the text takes for granted, such as ">= 5"; the full study's build checks it
     note : for authors
     """
@@ -58,6 +58,7 @@ class Entry(ConfigModel):
     rows: dict[str, _Value | tuple[_Value, ...]] = Field(default_factory=dict)
     take: Literal["max", "min", "median", "count", "distinct"] | None = None
     digits: Annotated[int, Field(ge=1, le=6)] = 2
+    percent: bool = False
     expect: Annotated[str, Field(pattern=_EXPECTATION)] | None = None
     note: str = ""
 
@@ -132,7 +133,8 @@ def number_of(name: str, known: Entries, tables: Mapping[str, pd.DataFrame]) -> 
     text, counts = MISSING, entry.take in _COUNTS
     if is_held(name, known, tables) if counts else len(cells):
         value = AGGREGATES[entry.take](cells) if entry.take else cells.iloc[0]
-        text = str(value) if counts else format_number(value, entry.digits)
+        shown = 100.0 * value if entry.percent else value
+        text = str(value) if counts else format_number(shown, entry.digits)
         if not isinstance(value, str):  # JSON has no infinite numbers: store them as text
             value = float(value) if np.isfinite(value) else str(float(value))
     held = [int(row) for row in np.flatnonzero(tables[entry.table].index.isin(cells.index))]
@@ -200,7 +202,7 @@ def _same(cell: Any, value: str) -> bool:
 
 
 def format_number(value: Any, digits: int = 2) -> str:
-    """Format a cell as TeX: text is escaped, numbers but integers get ``digits`` significant digits."""
+    """Format a cell as TeX: text is escaped, numbers but integers have ``digits`` digits."""
     if isinstance(value, str):
         return escape(value)
     if isinstance(value, bool | np.bool_):

@@ -47,7 +47,7 @@ def figure_numbers(root: Path) -> dict[str, str]:
 
 
 def source_files(root: Path, own: bool = False) -> list[str]:
-    """Paths of the manuscript's files, relative to ``root``: documents, preamble, numbers, sections.
+    """Paths of the manuscript's files, relative to ``root``: documents, preamble, numbers, parts.
 
     If ``own``, the documents are the short ones about a user's own scenes, without section files.
     """

@@ -82,20 +82,25 @@ def _cell(rows: pd.DataFrame, shown: Callable[[pd.Series], Any]) -> str:
 
 
 _VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
-_PARTS = {"published": "as published", "beyond": "beyond"}
+_VERDICTS = {"depends": "mixed", "not tested": NONE, "cannot be decided": NONE}
+_PARTS = {"published": "published method", "beyond": "improved method"}
 # Claim without a figure -> TeX label of the table that shows its result.
 _SHOWN = {"C11": "reruns", "C12": "positions"}
 _SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
 
 
+def _verdict(text: str) -> str:
+    return _VERDICTS.get(text, escape(text))
+
+
 def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
-    """Claims: verdicts on the preprint's and on improved methods, counts of rows passing tests.
+    """Claims: verdicts on the preprint's and on the improved method, counts of agreeing cases.
 
     A verdict that differs if the deformation error counts, too, stands beside the other.
     """
     tests = claims_tests[claims_tests.decides.astype(bool)]
-    columns = rf"l{LEFT}p{{4.7cm}}{LEFT}p{{3.2cm}}{LEFT}p{{4.1cm}}l"
-    yield columns, ["claim", "the preprint says", "as published", "beyond", "shown in"]
+    columns = rf"l{LEFT}p{{4.6cm}}{LEFT}p{{3.2cm}}{LEFT}p{{4.1cm}}l"
+    yield columns, ["claim", "the preprint says", *_PARTS.values(), "shown in"]
     for row in claims.itertuples():
         cells = []
         verdicts = (row.verdict, row.verdict_both), (row.verdict_beyond, row.verdict_beyond_both)
@@ -103,14 +108,59 @@ def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
             mine = _rows(tests, claim=row.claim, part=part).itertuples()
             counted = ", ".join(f"{test.satisfied}/{test.of}" for test in mine)
             colour = _VERDICT_COLOUR.get(verdict, "okgrey")
-            other = "" if both == verdict else f"; both errors: {escape(both)}"
-            cells.append(rf"\textcolor{{{colour}}}{{{escape(verdict)}}} ({counted}){other}")
+            other = "" if both == verdict else f"; both errors: {_verdict(both)}"
+            shown = rf"\textcolor{{{colour}}}{{{_verdict(verdict)}}}"
+            cells.append(shown + (f" ({counted})" if counted else "") + other)
         place = shown = row.figure_or_table
         if row.claim in _SHOWN:
             place = rf"table~\ref{{tab:{_SHOWN[row.claim]}}}"
         else:
             place = rf"figure~\ref{{fig:{shown}}}" if shown in declarations() else _name(shown)
         yield [row.claim, escape(row.paper), *cells, place]
+
+
+# Change, kind of mesh and words of each row of the table of paired comparisons.
+_CHANGES = (
+    ("three elements a mode for one", "sheets", "three elements per mode instead of one, sheets"),
+    ("three elements a mode for one", "bars", "three elements per mode instead of one, bars"),
+    ("shared coefficients, single rows", "sheets", "one system for all coordinates, sheets"),
+    ("shared coefficients, single rows", "bars", "one system for all coordinates, bars"),
+    ("whole elements, shared coefficients", "all", "whole elements instead of scattered rows"),
+)  # fmt: skip
+
+
+def interventions(gain_interventions: pd.DataFrame) -> Rows:
+    """Paired comparisons: ratios of the DEIM constant and of the error, rescued simulations."""
+    header = ["change", "constant", "error", "interval", "decreases in", "rescued"]
+    yield "lrrrrr", header
+    for step, mesh, words in _CHANGES:
+        for row in _rows(gain_interventions, step=step, mesh=mesh).itertuples():
+            interval = f"{_known(row.error_ratio_low)} to {_known(row.error_ratio_high)}"
+            families = f"{_whole(row.families_fallen)} of {_whole(row.families)}"
+            rescued = f"{_whole(row.rescued)} of {_whole(row.failing)}"
+            yield [
+                words,
+                *map(_known, (row.gain_ratio, row.error_ratio)),
+                interval,
+                families,
+                rescued,
+            ]
+
+
+def square(gain_interventions: pd.DataFrame) -> Rows:
+    """Failing simulations and median errors by number of systems and of sampled elements."""
+    yield "lrrrrr", ["", "one: failing", "error", "three: failing", "error", "three to one"]
+    for mesh in ("sheets", "bars"):
+        for kind in ("separate", "shared"):
+            step = f"three elements, {kind} coefficients"
+            for row in _rows(gain_interventions, step=step, mesh=mesh).itertuples():
+                before, after = (
+                    [f"{_whole(failing)} of {_whole(row.pairs)}", _known(error)]
+                    for failing, error in (
+                        (row.failing, row.error_before), (row.failing_after, row.error_after)
+                    )
+                )  # fmt: skip
+                yield [f"{mesh}, {kind} systems", *before, *after, _known(row.error_ratio)]
 
 
 def claims_in_full(claims_tests: pd.DataFrame) -> Rows:
@@ -135,7 +185,7 @@ def replications(replication: pd.DataFrame) -> Rows:
         for part in _PARTS:
             own = _rows(rows, part=part)
             cells += [own.verdict.iloc[0], *own.verdict_replication]
-        yield [claim, *(NONE if cell in NOT_DECIDED else escape(cell) for cell in cells)]
+        yield [claim, *(NONE if cell in NOT_DECIDED else _verdict(cell) for cell in cells)]
 
 
 # Columns of the table of iterations: (method, number K of local-global iterations in a frame).
@@ -213,32 +263,31 @@ def speedups(speedups: pd.DataFrame) -> Rows:
         ]
 
 
+# Basis of the positions, method and words of each row of the table of accurate simulations.
+_COMPARED = (
+    (FULL, "fewer-iterations", "full-order model, fewer iterations"),
+    (FULL, "coarser-mesh", "full-order model, coarser mesh"),
+    (FULL, "published", "preprint's code"),
+    (FULL, "deim-joint", "preprint's selection"),
+    (FULL, "deim", "entry-wise DEIM"),
+    (FULL, "block-deim", "element-wise DEIM"),
+    (FULL, "gappy", "element-wise DEIM, three elements for each mode"),
+    (FULL, "pod", "orthogonal projection, all elements"),
+    ("pod", "ecsw-1e-02", "reduced positions, sampled elements"),
+    ("pod", "full", "reduced positions, all elements"),
+)
+
+
 def payoff(payoff: pd.DataFrame) -> Rows:
-    """Numbers of scenes in which a reduction is accurate, and faster or slower than full order.
-
-    A number that differs if the deformation error counts, too, stands after a stroke.
-    """
-    yield "lrrrrrrrrrrrr", [
-        "reduction", "runs in", "accurate in", "pays in", "loses in", "least", "median", "most",
-        "training", "held out (of)", "playback", "accurate", "pays",
-    ]  # fmt: skip
-    position, both = (_rows(payoff, measure=measure) for measure in MEASURES)
-    both = both.set_index(["position_basis", "method"])
-
-    def counted(row: Any, column: str) -> str:
-        key, own = (row.position_basis, row.method), getattr(row, column)
-        other = float(both.loc[key, column]) if key in both.index else own
-        return _known(own, _whole) + ("" if other == own else f" / {_known(other, _whole)}")
-
-    for row in position.itertuples():
-        basis = "" if row.position_basis == FULL else f", {row.position_basis}"
-        unseen = f"{_known(row.error_heldout)} ({row.heldout})"
-        errors = _known(row.error_train), unseen, _known(row.playback_error)
-        gains = map(_known, (row.least_speedup, row.best_speedup, row.most_speedup))
-        counts = (counted(row, name) for name in ("scenes", "accurate", "pays", "loses"))
-        judged = ("accurate_heldout", "pays_heldout")
-        scored = [counted(row, name) if row.heldout else NONE for name in judged]
-        yield [_name(f"{row.method}{basis}"), *counts, *gains, *errors, *scored]
+    """Numbers of cases in which a method is accurate, and faster than the full-order model."""
+    header = ["method", "cases", "accurate", "on test trajectories", "faster", "speed-up"]
+    yield "lrrrrr", header
+    for basis, method, words in _COMPARED:
+        own = _rows(payoff, measure=MEASURES[0], position_basis=basis, method=method)
+        for row in own.itertuples():
+            test = _whole(row.accurate_heldout) if row.heldout else NONE
+            counts = map(_whole, (row.scenes, row.accurate))
+            yield [words, *counts, test, _whole(row.pays), _known(row.best_speedup)]
 
 
 APART = 2.0  # least ratio of the validation errors of two neighbours in the table frontier
@@ -397,8 +446,8 @@ def stability(stability: pd.DataFrame) -> Rows:
 TEX_TABLES: dict[str, Callable[..., Rows]] = {
     f"tab_{make.__name__}": make
     for make in (
-        claims, claims_in_full, replications, scenes, methods, ranks, reruns, stability,
-        iterations, positions, speedups, payoff, frontier, trajectories, error_budget,
+        claims, claims_in_full, interventions, square, replications, scenes, methods, ranks, reruns,
+        stability, iterations, positions, speedups, payoff, frontier, trajectories, error_budget,
     )
 }  # fmt: skip
 

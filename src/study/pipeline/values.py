@@ -32,7 +32,7 @@ from study.paper.build import PAGES, Facts
 from study.paper.source import source_files
 from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study, labels_of
-from study.tables.kit.results import FAR
+from study.tables.kit.results import FAILED, FAR
 
 # Basis that tables with one basis per group show; if no method uses it, that of the first method.
 USUAL_BASIS = "none-none-vectorised"
@@ -185,6 +185,7 @@ def _numbers(study: Study) -> dict[str, Any]:
         "opponent_frames": settings.alternatives.frames,
         "opponent_processes": settings.alternatives.processes,
         "far": FAR,
+        "accurate": FAILED,
         "carry": HeldOut().carry,
     }
 
