@@ -1,6 +1,6 @@
 r"""Conversion of the manuscript's source to LaTeX that pandoc can read, with numbers as links.
 
-Commands that TeX would evaluate are replaced here by their results: ``\n``, ``\known``, ``\row``,
+Commands that TeX would evaluate are replaced here by their results: ``\n``, ``\known``,
 ``\ifpart``, captions of figures. A number becomes a link to ``origin:KEY``, where KEY names a
 table and rows, in hexadecimal.
 """
@@ -49,7 +49,7 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
     """Return the ``source`` of a ``document`` for pandoc, with numbers as links to tables.
 
     ``origins`` is the content of numbers.json: for each number its table cells, for each document
-    which of its ``\\known`` and ``\\row`` blocks are shown. ``facts`` has the figures' captions.
+    which of its ``\\known`` blocks are shown. ``facts`` has the figures' captions.
     """
     preamble, begin, text = source.partition(r"\begin{document}")
     text = COMMENT.sub("", _decided(text, origins["known"][document]))
@@ -79,7 +79,7 @@ def _title(preamble: str) -> str:
 
 
 def _decided(source: str, known: Sequence[str]) -> str:
-    r"""Keep or drop each block ``\known`` or ``\row``, by ``known``."""
+    r"""Keep or drop each block ``\known``, by ``known``."""
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
         pieces += [source[start : sentence.start], sentence.text if decision == SHOWN else ""]

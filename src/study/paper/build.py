@@ -43,7 +43,7 @@ from study.tables.effects_cost import unreliable
 
 log = logging.getLogger(__name__)
 
-PAGES = {"main": 20, "supplement": 40}  # largest allowed number of pages of each document
+PAGES = {"main": 14, "supplement": 25}  # largest allowed number of pages of each document
 
 
 class Facts(BaseModel):
@@ -73,7 +73,7 @@ def write_inputs(
 
     ``made`` are the rules of all tables, figures and pages. `NUMBERS` (JSON) has the table cells
     from which each number ``\n`` is computed, the tables from which each TeX table is
-    made, and which ``\known`` and ``\row`` blocks are shown.
+    made, and which ``\known`` blocks are shown.
     """
     texts = documents(source[0].parent)
     whole = "".join(texts.values())

@@ -23,13 +23,13 @@ def defined(kind: str, texts: Mapping[str, str]) -> str:
     return "\n".join(["% generated", r"\makeatletter", *made, r"\makeatother"]) + "\n"
 
 
-_OPENING = re.compile(r"\\(?:known|row)\{")
+_OPENING = re.compile(r"\\known\{")
 _BRACE = re.compile(r"\\.|[{}]")  # a brace, or a backslash with the character that it escapes
 SHOWN, DROPPED = "shown", "dropped"
 
 
 class Sentence(NamedTuple):
-    r"""Block ``\known`` or ``\row``: content, and its slice of the TeX source."""
+    r"""Block ``\known``: content, and its slice of the TeX source."""
 
     text: str
     start: int
@@ -37,7 +37,7 @@ class Sentence(NamedTuple):
 
 
 def sentences(source: str) -> list[Sentence]:
-    r"""Return all ``\known`` and ``\row`` blocks of a TeX source, in order.
+    r"""Return all ``\known`` blocks of a TeX source, in order.
 
     Raises PaperError if a block is not closed or contains another block.
     """
@@ -53,7 +53,7 @@ def sentences(source: str) -> list[Sentence]:
 def decisions(
     source: str, known: Entries, tables: Mapping[str, pd.DataFrame], drawn: Collection[str] = ()
 ) -> list[str]:
-    r"""Show each ``\known`` or ``\row`` block of which ``tables`` and ``drawn`` have everything."""
+    r"""Show each ``\known`` block of which ``tables`` and ``drawn`` have everything."""
     return [
         SHOWN
         if {*PICTURE.findall(sentence.text)} <= {*drawn}

@@ -287,7 +287,7 @@ def payoff(payoff: pd.DataFrame) -> Rows:
         for row in own.itertuples():
             test = _whole(row.accurate_heldout) if row.heldout else NONE
             counts = map(_whole, (row.scenes, row.accurate))
-            yield [words, *counts, test, _whole(row.pays), _known(row.best_speedup)]
+            yield [words, *counts, test, _known(row.pays, _whole), _known(row.best_speedup)]
 
 
 APART = 2.0  # least ratio of the validation errors of two neighbours in the table frontier

@@ -31,7 +31,7 @@ from study.article.latex import linked_table
 from study.artifact.paths import File
 from study.experiments.machine import Record, Units
 from study.paper import build, textables
-from study.paper.numbers import AGGREGATES, MISSING, format_number, matching
+from study.paper.numbers import AGGREGATES, MISSING, entries, format_number, matching
 from study.paper.source import documents, figure_numbers
 from study.paper.tex import find_pdflatex, packages_of
 
@@ -46,15 +46,11 @@ MAIN = r"""
 \begin{abstract}\ifpart Of \configuration{}.\else Full.\fi\end{abstract}
 % \section{Not there}
 \section{First}\label{sec:first}
-On \scene{bar\_a} it is \val{payoff|method=pod|error_train}, at most \val{payoff|error_train|max} of
-$K = \val{payoff|scenes|max}$, named \val{payoff|method=pod|position_basis}; equation
+On \scene{bar\_a} it is \n{podError}\,\%, at most \n{worst} of
+$K = \n{scenes}$, named \n{basis}; equation
 \eqref{eq:one}, figure~\ref{fig:ladder}, table~\ref{tab:payoff}, theorem~\ref{thm:s},
 section~\ref{sec:more} \cite{Page63}. C1 holds.
-\known{Shown, \val{payoff|method=pod|scenes}.} \known{Left out, \val{payoff|method=x|scenes}.}
-\begin{tabular}{lr}
-\row{held & \val{payoff|method=pod|scenes} \\}
-\row{lacking & \val{payoff|method=x|scenes} \\}
-\end{tabular}
+\known{Shown, \n{podScenes}.} \known{Left out, \n{unknown}.}
 \paragraph{Opening.} Words.
 \begin{equation}\label{eq:one} a = b \end{equation}
 \figureof{ladder}
@@ -69,8 +65,17 @@ SUPPLEMENT = r"""
 \section{More}\label{sec:more} See \ref{sec:first}.
 \figureof{spring_runs}
 \figureof{bar_runs}
-\begin{theorem}\label{thm:s} Let $x$ be \val{study|scenes}. \end{theorem}
+\begin{theorem}\label{thm:s} Let $x$ be \n{all}. \end{theorem}
 \end{document}
+"""
+NUMBERS = """
+podError: {table: payoff, rows: {method: pod}, column: error_train, percent: true}
+worst: {table: payoff, column: error_train, take: max, digits: 3}
+scenes: {table: payoff, column: scenes, take: max}
+basis: {table: payoff, rows: {method: pod}, column: position_basis}
+podScenes: {table: payoff, rows: {method: pod}, column: scenes}
+unknown: {table: payoff, rows: {method: x}, column: scenes}
+all: {table: study, column: scenes}
 """
 CLAIM = """
 sets: {own: [numpy]}
@@ -134,6 +139,7 @@ def write_study(folder: Path) -> dict[str, object]:
     preamble = (ROOT / "paper" / "preamble.tex").read_text(encoding="utf-8")
     for name, text in {**texts, "preamble": preamble}.items():
         write_text(text, folder / "paper" / f"{name}.tex")
+    write_text(NUMBERS, folder / "paper" / "numbers.yaml")
     units = dict.fromkeys(Units.model_fields, 1.0)
     record = Record(**machine().model_dump(), units=units)
     write_text(record.model_dump_json(), folder / "machine.json")
@@ -263,21 +269,23 @@ def rows_at(path: Path, key: str) -> int:
 def test_each_number_is_the_pdfs_and_leads_to_the_cells_that_it_was_rounded_from(small):
     """The numbers of the macros, in order, and the rows of the page that a link opens."""
     origins = json.loads((small.parent / "inputs" / "numbers.json").read_text(encoding="utf-8"))
-    seen = set()
+    numbers, seen = {number["key"]: number for number in origins["numbers"].values()}, set()
+    asked = {entry.key: entry for entry in entries(small.parent / "paper").values()}
     for page in PAGES.values():
         for kind, address, words in Links(small / page).links:
             key = unquote(address).removeprefix("tables/").replace(".html#", "|", 1)
-            if kind != "val" or key not in origins["numbers"]:
+            if kind != "val" or key not in numbers:
                 continue
-            number = origins["numbers"][key]
+            number = numbers[key]
             seen.add(key)
             text = re.sub(r"^\\ensuremath\{(.*)\}$", r"\1", number["text"])
             assert words == text.replace(r"\_", "_")
             table = table_at(small / "tables" / f"{number['table']}.html")
             cells = table[number["column"]].iloc[number["rows"]]
             value = AGGREGATES[number["take"]](cells) if number["take"] else cells.iloc[0]
-            assert format_number(value) == number["text"]
-    assert seen == {key for key, number in origins["numbers"].items() if number["rows"]}
+            value = 100.0 * value if asked[key].percent else value
+            assert format_number(value, asked[key].digits) == number["text"]
+    assert seen == {key for key, number in numbers.items() if number["rows"]}
 
 
 def test_a_made_table_leads_to_its_rows(small):
@@ -416,7 +424,8 @@ def test_pages_open_without_a_message_and_axe_finds_no_error(small, width, schem
 def test_the_page_of_a_table_shows_the_rows_of_a_link_and_the_last_verification(small, tmp_path):
     for pages in study_or_small(small):
         inputs = pages.parent / ("inputs" if pages == small else "paper")
-        numbers = json.loads((inputs / "numbers.json").read_text(encoding="utf-8"))["numbers"]
+        read = json.loads((inputs / "numbers.json").read_text(encoding="utf-8"))["numbers"]
+        numbers = {number["key"]: number for number in read.values()}
         for table in {number["table"] for number in numbers.values()}:
             keys = [key for key, number in numbers.items() if number["table"] == table]
             with page_at((pages / "tables" / f"{table}.html").as_uri(), 900, 700) as page:

@@ -16,19 +16,10 @@ BLOCKS = rf"""\known{{The bar has {BAR} \emph{{so}}.}} Always. \known{{The cloth
 \known{{And {CLOTH} again.}}
 
 Next. \known{{Both: {BAR}, {CLOTH}.}}
-
-\begin{{tabular}}{{lr}}
-\hline
-\row{{bar & {BAR} \\}}
-\row{{cloth & {CLOTH} \\}}
-\hline
-\end{{tabular}}
 """
 
 
-@pytest.mark.parametrize(
-    "source", [r"\known{open {x}", r"\known{a \known{b} c}", r"\known{\row{b} c}"]
-)
+@pytest.mark.parametrize("source", [r"\known{open {x}", r"\known{a \known{b} c}"])
 def test_faulty_blocks_are_named(source):
     with pytest.raises(PaperError, match=r"another one|not closed"):
         tex.sentences(source)
@@ -36,7 +27,7 @@ def test_faulty_blocks_are_named(source):
 
 def test_a_block_needs_all_of_its_numbers_and_its_figure():
     made = tex.decisions(BLOCKS, KNOWN, HELD)
-    assert made == ["shown", "dropped", "dropped", "dropped", "shown", "dropped"]
+    assert made == ["shown", "dropped", "dropped", "dropped"]
     picture = r"\known{\pictureof{bars}{Bars.}}"
     assert tex.decisions(picture, KNOWN, HELD, ["bars"]) == ["shown"]
     assert tex.decisions(picture, KNOWN, HELD, ["sheets"]) == ["dropped"]

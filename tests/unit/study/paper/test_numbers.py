@@ -48,7 +48,7 @@ def number(asked: Entry) -> tex.Number:
         (entry("r", "distinct"), "2"),
         (entry("method", "distinct", r=7), "0"),
         (entry("error", scene="!=b", method="deim"), "0.12"),
-        (entry("method", "count", scene=("!=b", "!=bar_a")), "0"),
+        (entry("method", "count", method=("!=deim", "!=x")), "2"),
         (entry("method", scene="!=bar_a", r="!=20"), "pod"),
         (entry("error", "count"), "3"),
         (entry("finite", scene="b", r=20), "yes"),  # numpy.bool_, which is no bool
