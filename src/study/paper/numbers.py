@@ -8,6 +8,7 @@ typed and no sentence outlives its number.
 import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -160,7 +161,8 @@ def _selected(
 ) -> tuple[Entry, pd.DataFrame]:
     """Entry ``name`` and its rows; PaperError if the entry, its table or a column is unknown."""
     if name not in known:
-        raise PaperError(f"\\n{{{name}}}: no entry in {NUMBERS_FILE}{choices(name, known)}")
+        near = choices(name, get_close_matches(name, known))
+        raise PaperError(f"\\n{{{name}}}: no entry in {NUMBERS_FILE}{near}")
     entry = known[name]
     if entry.table not in tables:
         fault = f"no table '{entry.table}'{choices(entry.table, tables)}"

@@ -14,6 +14,7 @@ HANDED_ON = {
     "test": (sys.executable, "-m", "pytest"),
     "verify": (sys.executable, "-m", "study.verification.command", "verify"),
     "bundle": (sys.executable, "-m", "study.verification.command", "bundle"),
+    "number": (sys.executable, "-m", "study.verification.number"),
     "run": ("env",),
 }
 
