@@ -9,7 +9,7 @@ import numpy as np
 
 from pdrom.view.artists import Artist, Axes, Figure, Line2D, Patch
 
-WIDTH = 7.0  # inches, text width of the manuscript
+WIDTH = 6.53  # inches, text width of the manuscript
 DIGITS = 6  # decimals of the positions of axes, which are fractions of the figure
 
 # Palette of Okabe and Ito (2008), distinguishable with every common colour vision deficiency.

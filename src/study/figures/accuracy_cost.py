@@ -1,228 +1,96 @@
 """Error and time of reductions and of alternatives to projective dynamics."""
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
 from pdrom.model.held_out import FIRST, PLAYBACK
 from pdrom.reduction.settings import COARSER, pareto
 from pdrom.view import style
-from pdrom.view.artists import Axes, Figure, Line2D
+from pdrom.view.artists import Axes, Figure
+from study.artifact import words
 from study.artifact.reads import TableOf
 from study.experiments.alternatives.experiment import REDUCTIONS
-from study.experiments.kit.base import ANDERSON, FOM
-from study.figures.kit.declaration import Drawn, NothingToDraw, figure
+from study.experiments.kit.base import FOM
+from study.figures.kit.declaration import METHODS, Drawn, NothingToDraw, figure, held
+from study.figures.kit.labels import Curve, label_curves
 from study.figures.kit.multiples import label_outer, rows_of, small_multiples, time_axis
 
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
-LOW, HIGH = 1e-3, 1e2  # limits of the error axis; errors outside are arrows at the limits
-ABOVE, BELOW, BLOWN_UP = 6, 7, "x"  # Matplotlib markers: error above axis, below it, blow-up
-OWN = {"color": style.GREY, "linewidth": 1.2}
+LOW, HIGH = 3e-3, 20.0  # limits of the error axis; larger and smaller errors are on the limits
 MESH_ERROR = {"color": style.GREY, "linestyle": "-.", "linewidth": 1.0, "zorder": 0}
-LARGE, SMALL = 2.6, 1.6  # heights of the large and of the small panels, inches
-LINE, GAP = 0.145, 0.06  # height of a legend line, gap between rows of legend blocks, inches
-NEAR = 0.05  # markers closer in x than this fraction of the x axis share a label
-COLUMNS = 4  # number of legend blocks in a row
-# Families of reduced models and of full-order runs, each with its colour.
-FAMILIES = {
-    "full order, K iterations": style.BLACK,
-    "full order, coarser meshes": style.ORANGE,
-    "orthogonal projection": style.PURPLE,
-    "single entries, joint rows": style.VERMILLION,
-    "whole elements": style.BLUE,
-    "subspace, weighted or full": style.GREEN,
-    "subspace, interpolated": style.SKY,
+SAMPLED = "ecsw"
+# Curve -> label; the first two are full-order models.
+CURVES = {
+    FOM: "fewer or more iterations",
+    COARSER: "coarser mesh",
+    "published": words.method("published"),
+    "block-deim": words.method("block-deim"),
+    "gappy": words.method("gappy"),
+    SAMPLED: "reduced positions (ECSW)",
 }
-ITERATIONS, COARSE, PROJECTION, ENTRIES, ELEMENTS, WEIGHTED, INTERPOLATED = FAMILIES
-_BY_ROWS = {"all": PROJECTION, "scalar": ENTRIES, "joint": ENTRIES, "element": ELEMENTS}
+HEIGHT = 2.6  # of the figure, inches
 
 
-def look_of(method: str, position_basis: str, drawn: Drawn) -> tuple[str | None, str]:
-    """Family of a model (see `FAMILIES`; None if it is not drawn), and its legend entry."""
-    if method == FOM:
-        return ITERATIONS, "K iterations"
-    if method.startswith(COARSER):
-        return COARSE, "plain and accelerated"
-    if position_basis == "full":
-        known = drawn.reductions.get(method)
-        return _BY_ROWS[known.rows] if known else None, drawn.title(method)
-    if method == "full":
-        return WEIGHTED, "all projections"
-    return (WEIGHTED, "ecsw, by tolerance") if method.startswith("ecsw") else (INTERPOLATED, method)
+def curves(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Return the models of a scene by curve, as rows of ``table`` with a finite error and a time.
 
-
-@dataclass(frozen=True)
-class TradeOffs:
-    """Points (error, time) of reduced models in all scenes.
-
-    The "own" full-order run of a scene has as many iterations as the scene's configuration sets.
-
-    points : rows of table accuracy_cost, with ``family`` and ``member`` by `look_of`, and with the
-        ``marker`` of the member; errors are against the converged run
-    blown_up : the same of reduced runs that blew up before an error could be computed
-    own : scene -> row of its own full-order run; mesh_error is NaN where it is not known
+    Coarser meshes and sampled elements are the best settings, other curves all sizes by time.
     """
-
-    points: pd.DataFrame
-    blown_up: pd.DataFrame
-    own: pd.DataFrame
-
-
-def trade_offs(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> TradeOffs:
-    """Return points (error, time) of what ``drawn`` selects, in scenes that have some.
-
-    Raises NothingToDraw if no reduced model has both an error and a time.
-    """
-    table = table.dropna(subset=[ERROR, TIME])
-    own = (table.method == "full") & (table.position_basis == "full")
-    points = _drawn(table[(table[TIME] > 0.0) & ~own & (table.method != ANDERSON)], drawn)
-    points = points[points.scene.isin(drawn.scenes_of(points))]
-    number = points.groupby("family").member.transform(lambda names: pd.factorize(names)[0])
-    marker = number.map(lambda i: MARKERS[i % len(MARKERS)]).where(points.family != ITERATIONS, "X")
-    lost = runs[(runs.blowup_frame >= 0) & runs[ERROR].isna() & (runs[TIME] > 0.0)]
-    points = points.assign(number=number, marker=marker)
-    return TradeOffs(points, _drawn(lost, drawn), table[own].set_index("scene"))
-
-
-def _drawn(table: pd.DataFrame, drawn: Drawn) -> pd.DataFrame:
-    """Rows of ``table`` that are drawn, with new columns: family and legend entry of the model."""
-    names = zip(table.method, table.position_basis, strict=True)
-    looks = pd.DataFrame(
-        [look_of(*name, drawn) for name in names], table.index, ["family", "member"], dtype=object
-    )
-    return table.assign(**looks).dropna(subset="family")
-
-
-def draw_panel(ax: Axes, found: TradeOffs, scene: str, size: float = 3.0) -> None:
-    """Draw the models of ``scene``, the Pareto front of each family, and the full-order run.
-
-    Errors outside the axis are arrows at its ends, runs that blew up crosses near the upper end.
-    """
-    ax.set_xscale("log")
-    style.log_axis(ax, LOW, HIGH)
-    rows, lost = (part[part.scene == scene] for part in (found.points, found.blown_up))
-    for family, colour in FAMILIES.items():
-        part = rows[rows.family == family]
-        for (_, hollow), own in part.groupby(["number", part.position_basis == "skinning"]):
-            fill = {"fillstyle": "none"} if hollow else {}
-            _points(ax, own, size, colour, marker=own.marker.iloc[0], **fill)
-        front = best_points(part, ERROR)
-        heights = np.clip(front[ERROR].to_numpy(float), LOW, HIGH)
-        steps = {"linewidth": 1.3, "drawstyle": "steps-post", "zorder": 1.5}
-        ax.plot(front[TIME], heights, color=colour, **steps)
-        ended = lost[lost.family == family][TIME]
-        cross = {"markersize": 6.0, "markeredgewidth": 1.8}
-        ax.plot(ended, np.full(len(ended), 0.6 * HIGH), BLOWN_UP, color=colour, **cross)
-    run = found.own[found.own.index == scene]
-    time_axis(ax, np.array([*rows[TIME], *lost[TIME], *run[TIME]], dtype=float))
-    for time, error in zip(run[TIME], run.mesh_error, strict=True):
-        ax.axvline(time, zorder=0, **OWN)
-        ax.axhline(error, **MESH_ERROR)
-
-
-def _points(ax: Axes, rows: pd.DataFrame, size: float, colour: str, **look: Any) -> None:
-    error, time = rows[ERROR].to_numpy(float), rows[TIME].to_numpy(float)
-    inside = (error >= LOW) & (error <= HIGH)
-    common = {"linestyle": "none", "color": colour, "alpha": 0.75, "markeredgewidth": 0.9}
-    ax.plot(time[inside], error[inside], markersize=size, **common, **look)
-    for outside, rim, arrow in ((error < LOW, LOW, BELOW), (error > HIGH, HIGH, ABOVE)):
-        at = np.full(outside.sum(), rim)
-        ax.plot(time[outside], at, marker=arrow, markersize=size + 2.5, **common)
-
-
-def label_iterations(ax: Axes, found: TradeOffs, scene: str) -> None:
-    """Write "K = ..." beside full-order runs of ``scene``; neighbouring runs share a label."""
-    rows = found.points[(found.points.scene == scene) & (found.points.method == FOM)]
-    rows = rows.sort_values(TIME)
-    low, high = np.log10(ax.get_xlim())
-    groups: list[list[tuple[float, float, float]]] = []
-    for marker in zip(rows[TIME], rows[ERROR], rows.iterations, strict=True):
-        near = groups and np.log10(marker[0] / groups[-1][-1][0]) < NEAR * (high - low)
-        groups[-1].append(marker) if near else groups.append([marker])
-    for group in groups:
-        numbers = ", ".join(f"{count:.0f}" for _, _, count in group)
-        at = (group[0][0], min(height for _, height, _ in group))
-        look = {"textcoords": "offset points", "fontsize": 6.5, "ha": "right", "va": "top"}
-        ax.annotate(f"K = {numbers}", at, (-2.5, -3.5), **look)
-
-
-def handles(found: TradeOffs) -> list[tuple[str, list[Line2D]]]:
-    """Return blocks of the legend: full-order runs, then the models in ``found`` by `FAMILIES`."""
-    common = {"linewidth": 1.0, "markersize": 4.0}
-    first = style.handles({"K iterations": (style.BLACK, "X")}, **common)
-    first.append(style.handle("time with the scene's K", **OWN))
-    first.append(style.handle("error of the mesh itself", **MESH_ERROR))
-    blocks = [("full order", first)]
-    for family in [*FAMILIES][1:]:
-        members = found.points[found.points.family == family].sort_values("number")
-        looks = {row.member: (FAMILIES[family], row.marker) for row in members.itertuples()}
-        blocks += [(family, style.handles(looks, **common))] if looks else []
-    return blocks
+    table = table[(table[TIME] > 0.0) & np.isfinite(table[ERROR])]
+    found = {}
+    for name in CURVES:
+        best = name in (COARSER, SAMPLED)
+        rows = table[table.method.str.startswith(name) if best else table.method == name]
+        rows = rows[(rows.position_basis == "pod") == (name == SAMPLED)]
+        if len(rows):
+            found[name] = best_points(rows, ERROR) if best else rows.sort_values(TIME)
+    return found
 
 
 @figure(
-    title="What accuracy costs in time",
-    reads={"table": TableOf("accuracy_cost"), "runs": TableOf("reduced_reruns")},
-    # the first scene of the study is drawn large, then one for each other group
-    scenes="bar_release spring_oop strain_oop bend_curved bar_twist torus_release disc_strain "
-    "ball_shell starfish_twist",
+    title="Error against time per frame", reads={"table": TableOf("accuracy_cost")},
+    scenes="bar_release spring_oop strain_oop bend_curved torus_release disc_strain ball_shell",
     timed=True,
-)
-def accuracy_cost(drawn: Drawn, table: pd.DataFrame, runs: pd.DataFrame) -> Figure:
-    """Position error within the horizon, against the converged run, and time per frame of every
-    reduced model and of the full-order run with $K$ iterations, also on coarser meshes, whose
-    displacement is interpolated to all vertices. The vertical line is the time of the scene's own
-    number of iterations, the horizontal one the error of the mesh itself (Richardson's rule): a
-    smaller error buys no accuracy. A colour is a family of models, a marker one of its members (one
-    for all tolerances; hollow: in a subspace of skinning weights), a line the best trade-offs
-    within the family: further down and further left is better. Arrows on the rim are errors outside
-    the axis, crosses runs that blew up. Below, a scene for each other constraint group.
+)  # fmt: skip
+def accuracy_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
+    """Interpolated projections are accurate with enough samples, but reduced positions, fewer
+    iterations and coarser meshes reach most errors in less time. Position error on the training
+    trajectory, before the horizon and against the converged step, and time per frame, in one scene.
+    Marks are basis sizes $r$ (interpolated projections), numbers of iterations $K$ (full-order
+    model), and the best combinations of the number of modes and the tolerance (reduced positions)
+    or of mesh, iterations and acceleration (coarser mesh). The dash-dotted line, where it is known,
+    is the error of the mesh itself by Richardson's rule. Further down and further left is better;
+    errors outside the axis are drawn on its limits.
     """
-    found = trade_offs(drawn, table, runs)
-    first, *rest = drawn.scenes_of(found.points)
-    groups = {scene: drawn.groups_of(scene) for scene in (first, *rest)}
-    small = list({groups[scene]: scene for scene in reversed(rest)}.values())[::-1]
-    blocks = handles(found)
-    rows = [blocks[i : i + COLUMNS] for i in range(0, len(blocks), COLUMNS)]
-    lines = [LINE * (1.3 + max(len(entries) for _, entries in row)) + GAP for row in rows]
-    heights = [LARGE, *([SMALL] if small else []), sum(lines)]
-    figure = style.new_figure(sum(heights))
-    parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
-    ax = parts[0].subplots()
-    draw_panel(ax, found, first, size=4.2)
-    label_iterations(ax, found, first)
-    ax.set_title(f"{groups[first]}: {style.words(first)}")
-    ax.set(xlabel="time per frame (ms)", ylabel="position error")
-    if small:
-        axes = parts[1].subplots(1, len(small), sharey=True, squeeze=False)[0]
-        for ax, scene in zip(axes, small, strict=True):
-            draw_panel(ax, found, scene, size=2.4)
-            ax.set(title=f"{groups[scene]}:\n{style.words(scene)}", xlabel="time per frame (ms)")
-        axes[0].set_ylabel("position error")
-    top = 1.0
-    for row, height in zip(rows, lines, strict=True):
-        for place, (title, entries) in enumerate(row):
-            parts[-1].legend(
-                handles=entries, title=title, loc="upper left", alignment="left",
-                bbox_to_anchor=(0.01 + place / COLUMNS, top), fontsize=7, title_fontsize=7.5,
-                borderpad=0.0, borderaxespad=0.1, labelspacing=0.3, handlelength=1.8,
-            )  # fmt: skip
-        top -= height / sum(lines)
+    scene = drawn.scenes_of(held(table.dropna(subset=[ERROR, TIME])))[0]
+    table = table[table.scene == scene]
+    found, labelled = curves(table), list[Curve]()
+    figure = style.new_figure(HEIGHT)
+    ax = figure.subplots()
+    for name, rows in found.items():
+        colour, marker = METHODS["full" if name == FOM else name]
+        points = np.stack([rows[TIME], rows[ERROR].clip(LOW, HIGH)], axis=1)
+        ax.plot(*points.T, color=colour, marker=marker, markersize=4.5, linewidth=1.3)
+        labelled.append((CURVES[name], colour, points))
+    for error in table.mesh_error.dropna().unique():
+        ax.axhline(error, **MESH_ERROR)
+    style.log_axis(ax, LOW, HIGH)
+    time_axis(ax, np.concatenate([rows[TIME] for rows in found.values()]))
+    ax.set(title=words.scene(scene), xlabel="time per frame (ms)", ylabel="position error")
+    label_curves(ax, labelled, (0.9 * style.WIDTH, HEIGHT - 0.6))
     return figure
 
 
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits
 BESIDE = 4  # largest number of panels in a row
-BEST, DOT = {"full order, same mesh": style.BLACK, COARSE: FAMILIES[COARSE]}, (0.55, 0.55, 0.55)
-# Legend label -> (condition on the number of training motions of a reduction, colour).
+BEST = {"full-order model": style.BLACK, "full-order model, coarser meshes": style.ORANGE}
+DOT = (0.55, 0.55, 0.55)
+# Legend label -> (condition on the number of training trajectories of a reduction, colour).
 TRAINED = {
-    "reduced, one training trajectory": ("training_motions == 1", style.GREEN),
-    "reduced, several trajectories": ("training_motions > 1", style.BLUE),
+    "reduced model, one training trajectory": ("training_motions == 1", "#7FCFB4"),
+    "reduced model, several trajectories": ("training_motions > 1", style.GREEN),
 }
-BARE = "reduced, without the vertices"
+BARE = "without the time of the vertices"
 
 
 @figure(
@@ -263,7 +131,7 @@ def _draw_case(ax: Axes, labels: tuple[str, float, float], case: pd.DataFrame) -
     (scene, _, stiffness), vertices = labels, case.vertices.max()
     stiff = "" if stiffness == 1.0 else rf" $\times {stiffness:g}$"
     mark = "*" if case.recorded.notna().any() else ""
-    ax.set_title(f"{style.words(scene)}{stiff}, {vertices:,.0f} vertices{mark}", fontsize=7.0)
+    ax.set_title(f"{words.scene(scene)}{stiff},\n{vertices:,.0f} vertices{mark}", fontsize=7.5)
     style.log_axis(ax, LEAST, MOST)
     time_axis(ax, case.time_ratio.to_numpy(float))
     rows = case.rename(columns={"error_implicit": "error"}).dropna(subset="error")

@@ -32,6 +32,7 @@ from pdrom.model.effects.base import EffectConfigs
 from pdrom.view import style
 from pdrom.view.artists import Figure, Line2D
 from pdrom.view.camera import Camera, up_of
+from study.artifact import words
 from study.artifact.artifact import Artifact, declare, declared_in
 from study.artifact.paths import FIGURE, FIGURE_PICTURE, File
 from study.artifact.reads import Read, Setting, TableOf
@@ -39,17 +40,20 @@ from study.artifact.text import to_plain
 from study.tables.effects_cost import unreliable
 
 MESHES = "disc_strain ball_shell torus_release starfish_twist"  # scenes of config/extended.yaml
-# Reduction method -> colour and marker.
+# Method, or mesh of the full-order model -> colour and marker.
 METHODS: dict[str, tuple[str, str]] = {
-    "pod": (style.BLACK, "o"),
-    "deim": (style.ORANGE, "s"),
-    "qdeim": (style.SKY, "^"),
-    "deim-joint": (style.VERMILLION, "D"),
-    "published": (style.PURPLE, "v"),
-    "block-deim": (style.BLUE, "P"),
-    "block-qdeim": (style.GREEN, "X"),
-    "gappy": ("#7A5C00", "<"),
-    "bounded": ("#1F9E89", "*"),
+    "full": (style.BLACK, "o"),
+    "coarser-mesh": (style.ORANGE, "H"),
+    "published": (style.VERMILLION, "v"),
+    "deim-joint": ("#7A5C00", "D"),
+    "deim": (style.PURPLE, "s"),
+    "qdeim": ("#882255", "^"),
+    "block-deim": (style.SKY, "P"),
+    "block-qdeim": ("#332288", "X"),
+    "gappy": (style.BLUE, "<"),
+    "bounded": ("#44AA99", "*"),
+    "pod": (style.GREY, "d"),
+    "ecsw": (style.GREEN, ">"),
 }
 _RESERVE = (("#5A5A5A", "1"), ("#9A6A00", "2"), ("#6B3F00", "3"), ("#2B2B80", "4"))
 _GROUPS = [name for name in EFFECTS if EFFECTS[name].startswith(constraints.__name__)]
@@ -110,7 +114,8 @@ class Experiment(BaseModel, extra="forbid", frozen=True):
     @property
     def title(self) -> str:
         """Title of a panel; the group is named only if the scene reduces several groups."""
-        return style.words(self.scene if self.only else f"{self.scene}: {self.group}")
+        scene = words.scene(self.scene)
+        return scene if self.only else f"{scene}: {style.words(self.group)}"
 
     def find(self, files: Sequence[File], **labels: str) -> str:
         """First path in ``files`` for this scene, group, mesh and ``labels``; "" without one."""
@@ -175,9 +180,9 @@ class Drawn(BaseModel, extra="forbid", frozen=True):
         return style.words(groups[0]) if len(groups) == 1 else "several groups"
 
     def title(self, method: str) -> str:
-        """Title of ``method`` as plain words; its name if the method is not selected."""
+        """Words for ``method``."""
         known = self.reductions.get(method)
-        return style.plain_words(known.title if known else method)
+        return style.plain_words(words.method(method, known.title if known else ""))
 
     def handles(self, looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
         """Legend entries for ``looks`` (method -> colour, marker); ``common``: options of each."""

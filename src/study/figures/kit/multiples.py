@@ -46,7 +46,7 @@ def label_outer(axes: list[Axes], columns: int, x: str, y: str) -> None:
 
 def label_rows(ax: Axes, names: Sequence[str]) -> None:
     """Label the rows of ``ax`` at y = 0, 1, 2, ..., from the top."""
-    ax.set_yticks(range(len(names)), [style.words(name) for name in names])
+    ax.set_yticks(range(len(names)), names)
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.tick_params(axis="y", length=0)
 
