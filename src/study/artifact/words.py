@@ -3,8 +3,8 @@
 # Scene -> at most 30 characters; "short" scenes end before rounding errors matter.
 SCENES = {
     "cloth_all": "upright cloth, three groups",
-    "cloth_all_oop": "horizontal cloth, three groups",
-    "cloth_all_twin": "horizontal cloth, row by row",
+    "cloth_all_oop": "hanging cloth, three groups",
+    "cloth_all_twin": "horizontal cloth, three groups",
     "cloth_corner": "wavy cloth on a corner",
     "cloth_side": "upright cloth, held at a side",
     "bend_fall": "falling sheet, bending",

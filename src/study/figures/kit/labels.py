@@ -20,13 +20,13 @@ def label_curves(ax: Axes, curves: Sequence[Curve], size: tuple[float, float]) -
 
     The places that are tried are those around all points of the curve; that with the least ink and
     text in its way is taken. ``size`` is the approximate width and height of ``ax`` in inches. The
-    limits of ``ax`` must have been set.
+    limits of ``ax`` must have been set. A curve without a label is only in the way.
     """
     scaled = [_inches(ax, points, size) for *_, points in curves]
     ink, taken = np.concatenate([_dense(points) for points in scaled]), list[np.ndarray]()
     for (label, colour, points), own in zip(curves, scaled, strict=True):
         tried = []
-        for at in np.flatnonzero(np.isfinite(own).all(axis=1)):
+        for at in np.flatnonzero(np.isfinite(own).all(axis=1)) if label else ():
             for preference, offset in enumerate(PLACES):
                 box = _box(own[at], label, offset)
                 tried.append((_cost(box, size, ink, taken) + 0.1 * preference, at, offset, box))
