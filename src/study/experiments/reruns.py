@@ -36,6 +36,7 @@ ERROR_COLUMNS = [
     "gain", "rows_sampled", "elements_sampled",
 ]  # fmt: skip
 DENSE, STEP = 10, 10
+TEST_FRAMES = 20  # of a test trajectory, the positions of frames 0, 20, 40, ... are stored
 
 
 def sweep(largest: int) -> set[int]:
@@ -101,8 +102,8 @@ def _runs(
 ) -> Iterator[Row]:  # fmt: skip
     """Run a motion with every reduction, store the runs in ``file``, and yield their table rows.
 
-    A size r above the rank is not run: its row has no results, its group is ``marked``. Positions
-    are stored for the training motion only, whose ``file`` is the root group.
+    A size r above the rank is not run: its row has no results, its group is ``marked``. The
+    positions of all frames are stored for training only, whose ``file`` is the root group.
     """
     for r, reduction in sampled.items():
         store, row, outcome = file.create_group(f"r{r:04d}"), labels | {"r": r, "frames": 0}, None
@@ -112,7 +113,7 @@ def _runs(
             row, outcome = run(yardstick, model, row | {"gain": reduction.gain})
             row["energy_ratio"] = store_series(store, yardstick, outcome)
             log.info("r = %d: %d frames, blow-up %s", r, outcome.frames, outcome.blowup_frame)
-        store_end(store, outcome, r, with_positions=file.name == "/")
+        store_end(store, outcome, r, every=1 if file.name == "/" else TEST_FRAMES)
         yield row
 
 

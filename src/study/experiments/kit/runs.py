@@ -36,16 +36,14 @@ def store_series(
     return largest(apart["energy"])
 
 
-def store_end(
-    store: h5py.Group, outcome: Rerun | None, r: int, with_positions: bool = True
-) -> None:
-    """Store the size r of a run, how it ended and, if asked, positions in single precision.
+def store_end(store: h5py.Group, outcome: Rerun | None, r: int, every: int = 1) -> None:
+    """Store the size r of a run, how it ended, and positions in single precision.
 
-    The attribute ``marked`` tells that the basis has fewer than r modes, so that nothing ran.
+    Only frames whose number is a multiple of ``every`` are stored. The attribute ``marked`` tells
+    that the basis has fewer than r modes, so that nothing ran.
     """
-    store.attrs.update(r=r, marked=outcome is None)
+    store.attrs.update(r=r, marked=outcome is None, every=every)
     if outcome is not None:
         blowup = -1 if outcome.blowup_frame is None else outcome.blowup_frame
         store.attrs.update(blowup_frame=blowup, max_extent=outcome.max_extent)
-        if with_positions:
-            store["positions"] = outcome.positions.astype(np.float32)
+        store["positions"] = outcome.positions[::every].astype(np.float32)
