@@ -29,6 +29,7 @@ class RunPanel:
     remark : one line below the picture
     reference : whether this is the run with which the other runs are compared
     obstacles : surfaces of the obstacles; None draws the floor y = 0
+    cropped : whether what exceeds the window is cut off, rather than drawn smaller
     """
 
     title: str
@@ -38,6 +39,7 @@ class RunPanel:
     remark: str | None = None
     reference: bool = False
     obstacles: Sequence[Mesh] | None = None
+    cropped: bool = False
 
     @property
     def began(self) -> bool:
@@ -47,7 +49,7 @@ class RunPanel:
     def zoomed(self, window: Window, camera: Camera) -> Window:
         """Return ``window``, enlarged in both directions if ``camera`` sees the run exceed it."""
         flat = None if self.positions is None else camera.project(self.positions)
-        if flat is None or window.contains(flat).all():
+        if flat is None or self.cropped or window.contains(flat).all():
             return window
         corners = [(window.left, window.bottom), (window.right, window.top)]
         both = bounds(np.concatenate([flat, corners]), 0.03)
@@ -83,7 +85,7 @@ def draw_run(ax: Axes, row: "Row", i: int) -> None:
     from matplotlib.collections import LineCollection
 
     mesh, panel, camera, window = row.mesh, row.panels[i], row.camera, row.windows[i]
-    ax.set_title(panel.title, pad=3)
+    ax.set_title(panel.title, pad=3, fontsize=7.5)
     if panel.failure:
         look = {"facecolor": "#FBEDEB", "edgecolor": "#EBB9B4", "hatch": "////", "linewidth": 0.0}
         _cover(ax, zorder=-5, **look)

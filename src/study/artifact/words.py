@@ -50,7 +50,7 @@ METHODS = {
     "bounded": "bounded DEIM constant",
     "pod": "orthogonal projection",
     "hrpd": "fitted projections",
-    "ecsw": "sampled elements (ECSW)",
+    "ecsw": "reduced positions (ECSW)",
 }
 TRAJECTORIES = {"train": "training", "heldout": "test 1", "kick": "test 2", "stiffness": "test 3"}
 _SHORT = "_twin"  # ending of the names of scenes that end early

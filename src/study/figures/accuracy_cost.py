@@ -26,7 +26,7 @@ CURVES = {
     "published": words.method("published"),
     "block-deim": words.method("block-deim"),
     "gappy": words.method("gappy"),
-    SAMPLED: "reduced positions (ECSW)",
+    SAMPLED: words.method(SAMPLED),
 }
 HEIGHT = 2.6  # of the figure, inches
 

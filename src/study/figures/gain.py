@@ -12,13 +12,14 @@ import pandas as pd
 from pdrom.core.store import read_table
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
+from study.artifact import words
 from study.artifact.reads import ProjectFile, TableOf
 from study.figures.kit.declaration import GROUPS, MESHES, Drawn, Experiment, figure, held
-from study.figures.kit.multiples import label_outer, small_multiples
+from study.figures.kit.multiples import label_outer, label_rows, small_multiples
 from study.tables.kit.results import FAILED, judged_runs
 
 GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on the limits
-ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-4, 1e2)
+ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-3, 30.0)
 ENDS = ("low", "median", "high")
 DECADES = 4  # bars, one for each decade of the gain from 1 on; one more bar: all larger gains
 _KEYS = ["scene", "group", "method", "r"]
@@ -99,71 +100,61 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     ax.grid(True)
 
 
+# Step of the ladder -> words; each step keeps what the steps before it have changed.
+STEPS = {
+    "published code": "preprint's code",
+    "+ affine centring": "snapshots less their mean",
+    "+ shared coefficients": "one system for all coordinates",
+    "+ whole elements": "elements instead of rows",
+    "+ three elements a mode (sound)": "three elements per mode",
+    "and a gain of at most 2": "DEIM constant of at most 2",
+}
+THICK = 2  # number of scenes with thick lines and printed DEIM constants
+
+
 @figure(
-    title="One choice after the other", reads={"table": TableOf("ladder")},
-    scenes=f"bar_release spring_twist_twin spring_oop strain_twist_twin strain_oop {MESHES}",
+    title="One change after the other", reads={"table": TableOf("ladder")},
+    scenes="bar_release spring_oop bar_twist strain_oop spring_twist_twin strain_twist_twin "
+    f"bend_curved {MESHES}",
 )  # fmt: skip
 def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Above the line one ingredient after the other is changed, from the published code to whole
-    elements with oversampling; below it each row takes a single ingredient away from the complete
-    method or exchanges it. Left the error of the rerun within the horizon, right the gain of the
-    interpolation; what blew up or is singular lies on the right rim. Bars show the range over runs
-    that are trained on as many resampled frames, on some scenes; pale ones that over choices of the
-    arbitrary signs of the singular vectors.
+    """One system for all coordinates and three elements per mode lower the error most. Position
+    error of reduced simulations of the training trajectory, before the horizon and against the
+    full-order simulation; one line per scene. From row to row one ingredient is changed, beginning
+    with the choices of the preprint's code, and all earlier changes are kept. Simulations that blew
+    up are on the right limit. Thin horizontal lines are ranges over simulations that are trained on
+    as many resampled frames. The numbers on the right are the DEIM constants of the scenes with
+    thick lines.
     """
-    shown = table.scene.isin(drawn.scenes) & table.gain.notna() & (table.direction != "square")
-    table = held(table[shown])
-    climbed = table[table.direction.isin(["up", "down"])]
-    rungs = list(dict.fromkeys(zip(climbed.direction, climbed.rung, strict=True)))
-    figure = style.new_figure(0.2 * len(rungs) + 1.2)
-    left, right = figure.subplots(1, 2, sharey=True)
-    error = ("relative_error_within_horizon", "error_low", "error_high")
-    _draw_quantity(left, table, rungs, error, LADDER_ERRORS)
-    _draw_quantity(right, table, rungs, ("gain", "gain_low", "gain_high"), GAINS)
-    left.set_xlabel("error of the rerun within the horizon (relative)")
-    right.set_xlabel("gain of the interpolation")
-    left.set_yticks(range(len(rungs)), [style.plain_words(rung) for _, rung in rungs])
-    left.invert_yaxis()
-    looks = {style.words(scene): look for scene, look in _scene_looks(table).items()}
-    handles = style.handles(looks, linestyle="none")
-    handles.append(style.handle("range: training frames", color=style.GREY, linewidth=0.9))
-    handles.append(style.handle("range: signs", color=style.GREY, linewidth=3.0, alpha=0.35))
-    style.legend(figure, handles, 4)
+    table = held(table[table.scene.isin(drawn.scenes) & table.gain.notna()])
+    table = held(table[table.direction.isin(["up", "down"])])
+    known = [step for step in STEPS if step in {*table.rung}]
+    steps = known or list(dict.fromkeys(table.rung[table.direction == "up"]))
+    scenes = [scene for scene in drawn.scenes if scene in {*table.scene}]
+    figure = style.new_figure(0.21 * len(steps) + 1.25)
+    ax = figure.subplots()
+    ax.set(xscale="log", xlim=(LADDER_ERRORS[0], LADDER_ERRORS[1] * 1.1), xlabel="position error")
+    ax.grid(True, axis="x")
+    looks = dict(zip(scenes, zip(cycle(style.CYCLE), cycle("os^DvPX"), strict=False), strict=False))
+    for place, (scene, (colour, marker)) in reversed([*enumerate(looks.items())]):
+        rows = table[table.scene == scene].drop_duplicates("rung").set_index("rung").reindex(steps)
+        thick = place < THICK
+        heights = np.arange(len(steps)) + 0.06 * (place - 0.5 * (len(scenes) - 1))
+        look = {"color": colour, "marker": marker, "markersize": 5.0 if thick else 3.0}
+        errors = rows.relative_error_within_horizon.fillna(np.inf).clip(*LADDER_ERRORS)
+        ax.plot(errors, heights, linewidth=2.0 if thick else 0.7, **look)
+        ends = (rows[end].clip(*LADDER_ERRORS) for end in ("error_low", "error_high"))
+        ax.hlines(heights, *ends, color=colour, linewidth=0.9)
+        if thick:
+            column = {"transform": ax.get_yaxis_transform(), "color": colour, "ha": "right"}
+            for y, constant in enumerate(rows.gain):
+                number = f"{constant:,.0f}" if constant >= 10.0 else f"{constant:.1f}"
+                ax.text(1.09 + 0.1 * place, y, number, va="center", **column)
+    ax.text(1.2, -0.75, "DEIM constants", ha="right", transform=ax.get_yaxis_transform())
+    label_rows(ax, [STEPS.get(step, style.plain_words(step)) for step in steps])
+    named = {words.scene(scene): look for scene, look in looks.items()}
+    style.legend(figure, style.handles(named), 3)
     return figure
-
-
-def _scene_looks(table: pd.DataFrame) -> dict[str, tuple[str, str]]:
-    """Map each scene in ``table`` to (colour, marker)."""
-    looks = zip(cycle(style.CYCLE), cycle("os^DvPX"), strict=False)
-    return dict(zip(dict.fromkeys(table.scene), looks, strict=False))
-
-
-def _draw_quantity(
-    ax: Axes, table: pd.DataFrame, rungs: list[tuple[str, str]], columns: tuple[str, str, str],
-    limits: tuple[float, float],
-) -> None:  # fmt: skip
-    ax.set(xscale="log", xlim=(limits[0], limits[1] * 1.3))
-    ax.grid(True)
-    scenes = _scene_looks(table)
-    for i, (scene, (colour, marker)) in enumerate(scenes.items()):
-        rows = table[table.scene == scene].set_index(["direction", "rung"])
-        found, low, high = (
-            np.array([rows[column].get(rung, np.nan) for rung in rungs], float)
-            for column in columns
-        )
-        values = np.clip(np.nan_to_num(found, nan=np.inf), *limits)
-        heights = np.arange(len(rungs)) + 0.09 * (i - 0.5 * (len(scenes) - 1))
-        ax.plot(values, heights, linestyle="none", color=colour, marker=marker, markersize=3.2)
-        repeated = ~np.isnan(low)
-        ends = (np.clip(bound[repeated], *limits) for bound in (low, high))
-        ax.hlines(heights[repeated], *ends, color=colour, linewidth=0.9)
-        signs = table[(table.scene == scene) & (table.direction == "signs")][columns[0]]
-        if len(signs):
-            spread = np.clip(np.nan_to_num(signs.to_numpy(float), nan=np.inf), *limits)
-            wide = {"color": colour, "linewidth": 3.0, "alpha": 0.25}
-            ax.hlines(heights[0], spread.min(), spread.max(), **wide)
-    first_down = next((i for i, (d, _) in enumerate(rungs) if d == "down"), len(rungs))
-    ax.axhline(first_down - 0.5, color="#333333", linewidth=0.8)
 
 
 VALUES = (1e-17, 3.0)

@@ -8,29 +8,32 @@ import numpy as np
 import pandas as pd
 
 from pdrom.core.store import open_hdf5
+from pdrom.model.held_out import FIRST
 from pdrom.model.mesh.types import Mesh, load_mesh
 from pdrom.view import panels as view
 from pdrom.view import style
 from pdrom.view.artists import Figure, ScalarMappable
 from pdrom.view.camera import Camera, obstacles
 from pdrom.view.panels import Row, RunPanel
-from study.artifact.paths import MESH, NOISE_RUNS, RERUNS, SUBSPACES, TRAIN, File
+from study.artifact import words
+from study.artifact.paths import HELDOUT, MESH, NOISE_RUNS, RERUNS, SUBSPACES, TRAIN, File
 from study.artifact.reads import EachOf, Every, Read, TableOf
 from study.experiments.kit.base import Horizon
-from study.figures.kit.declaration import GROUPS, Drawn, Experiment, camera_of, figure
+from study.experiments.reruns import TEST_FRAMES
+from study.figures.kit.declaration import GROUPS, METHODS, Drawn, Experiment, camera_of, figure
 from study.figures.kit.elements import magnitudes
 from study.figures.kit.read import choose_ranks, positions_at, rerun_infos
 from study.figures.sensitivity_floor import FLOORS, floors_of
 from study.tables.errors import VOLUMES
-from study.tables.kit.results import trained
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
 NOTHING_RAN = "not run: the projections are round-off, there is nothing to reduce"
 WRONG = 0.1  # a run has failed if its relative error exceeds this, or if it blew up
 DISTANCES = (1e-4, 1.0)  # limits of colours: distance from full order / longest side of mesh
 FOOTER = 0.55  # height of the colour scale, inches
-TOLERANCE = "ecsw-1e-02"  # method of the run in a position subspace that figure `teaser` shows
-MODES = 20  # largest allowed number of modes k of the position subspace in figure `teaser`
+# Figure `teaser`: instant as a fraction of the run, number of modes r, limit of k, and tolerance.
+INSTANT, MODES, TOLERANCE = 0.65, 20, "ecsw-1e-02"
+TEASER_ROW = 1.6  # largest height of its rows, inches
 Ranks = tuple[int | Literal["full"], ...]
 PAIR = "deim-joint block-deim"
 RANKS: Ranks = (6, 10, 20, "full")  # basis sizes; full stands for the numerical rank
@@ -309,65 +312,82 @@ def _colours() -> ScalarMappable:
 
 
 @figure(
-    title="Two scenes under five reductions",
+    title="Two scenes on a test trajectory",
     reads={
-        **RUNS, "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
-        "errors": TableOf("reduced_reruns"),
-    }, scenes="bar_release spring_oop", methods="deim-joint deim block-deim gappy",
+        "meshes": RUNS["meshes"], "full_order": EachOf(HELDOUT, "drawn.experiments"),
+        "reruns": RUNS["reruns"], "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
+        "table": TableOf("reduced_reruns"),
+    }, scenes="bar_release spring_oop", methods="published gappy",
+    timed=True,
 )  # fmt: skip
-def teaser(drawn: Drawn, horizon: Horizon, errors: pd.DataFrame, **files: Files) -> Figure:
-    """One instant of the motion that trained all of them. `deim-joint` is the preprint's method:
-    joint rows, a system for each axis. `deim` samples single entries, `block-deim` whole elements,
-    `gappy` three elements a mode, all with shared coefficients. `ecsw` reduces positions and sums
-    sampled elements with non-negative weights. $r$ and $k$ are numbers of modes, errors are
-    relative to the motion; the outline is the full order. A framed picture is drawn to the smaller
-    scale given below it.
+def teaser(drawn: Drawn, table: pd.DataFrame, **files: Files) -> Figure:
+    """The preprint's method fails on a trajectory on which it was not trained; three sampled
+    elements per mode with one system for all coordinates, and reduced positions with sampled
+    elements (ECSW), follow the full-order model. One frame of the first test trajectory of two
+    scenes; below each picture the position error over all frames before the horizon, against the
+    full-order model, and the time per frame. $r$ and $k$ are the numbers of modes for projections
+    and for positions. The grey outline is the full-order model; what lies outside its frame is cut
+    off.
     """
-    subspaces = files.pop("subspaces")
-    runs, errors = Runs(drawn, horizon, (20,), (0.65,), **files), trained(errors)
-    return view.draw_rows(
-        [_teaser_row(runs, each, errors, each.find(subspaces)) for each in drawn.experiments]
-    )
+    rows = [_teaser_row(drawn, each, table, files) for each in drawn.experiments]
+    return view.draw_rows(rows, height_limit=TEASER_ROW * len(rows))
 
 
-def _teaser_row(runs: Runs, experiment: Experiment, errors: pd.DataFrame, subspace: str) -> Row:
-    """Return a row with the full-order run and the reduced runs of ``experiment``.
+def _teaser_row(
+    drawn: Drawn, experiment: Experiment, table: pd.DataFrame, files: dict[str, Files]
+) -> Row:
+    """Return a row with the full-order run and the reduced runs of ``experiment``."""
+    (frame,), _ = positions_at(experiment.find(files["full_order"]), (INSTANT,))
+    frame -= frame % TEST_FRAMES
+    with open_hdf5(experiment.find(files["full_order"])) as file:
+        full = file["positions"][frame : frame + 1]
+    looks = METHODS | drawn.looks
+    colours = {name: style.surface_colour(colour) for name, (colour, _) in looks.items()}
+    table = table[(table.scene == experiment.scene) & table.group.isin([experiment.group, "all"])]
+    panels, sizes = list[RunPanel](), dict[str, int]()
+    for method in drawn.methods:
+        infos = rerun_infos(experiment.find(files["reruns"], method=method), FIRST)
+        for info in [info for info in choose_ranks(infos, (MODES,)) if not info.marked][-1:]:
+            rows = table[(table.method == method) & (table.r == info.r)]
+            shown = info.panel(frame, colours[method])
+            panels.append(_with_numbers(shown, drawn.title(method), rows))
+            sizes["r"] = info.r
+    if path := experiment.find(files["subspaces"]):
+        sizes["k"], positions = _subspace(frame, path)
+        rows = table[(table.method == TOLERANCE) & (table.k == sizes["k"])]
+        shown = RunPanel("", colours["ecsw"], positions, None if positions is not None else "blew up")
+        title = words.method(TOLERANCE).partition(" (")[0]
+        panels.append(_with_numbers(shown, title, rows))
+    time = (table.ms_per_frame * table.speedup).median()
+    first = RunPanel(words.method("full"), style.FULL_ORDER, full[0], reference=True)
+    first = replace(first, remark=f"{time:.2g} ms")
+    camera, bodies = camera_of(experiment), obstacles_of(experiment, full)
+    window = view.shared_window(camera, full[0], panels)
+    panels = [replace(panel, obstacles=bodies, cropped=True) for panel in (first, *panels)]
+    size = ", ".join(f"{name} = {number}" for name, number in sizes.items())
+    label = f"{experiment.title}\n{words.TRAJECTORIES[FIRST]}\nframe {frame}\n{size}"
+    ghosts, windows = np.repeat(full, len(panels), axis=0), [window] * len(panels)
+    return Row(label, load_mesh(experiment.find(files["meshes"])), panels, windows, ghosts, camera)
 
-    ``errors`` is of the training motion; ``subspace`` has the runs in position subspaces, or is "".
+
+def _with_numbers(panel: RunPanel, title: str, rows: pd.DataFrame) -> RunPanel:
+    """Return ``panel`` with ``title``; below it, error and time of a model in ``rows``."""
+    error = rows.relative_error_within_horizon[rows.motion == FIRST].dropna()
+    look = {"precision": 2, "fractional": False, "trim": "-"}
+    texts = [f"error {np.format_float_positional(100.0 * e, **look)} %" for e in error[:1]]
+    texts += [f"{value:.2g} ms" for value in rows.ms_per_frame.dropna()[:1]]
+    return replace(panel, title=title, failure=None, remark=", ".join(texts) or panel.remark)
+
+
+def _subspace(frame: int, path: str) -> tuple[int, np.ndarray | None]:
+    """Number of modes of the largest position subspace up to `MODES`, and its positions (N, 3) m.
+
+    The positions are None if the run on the test trajectory ended before ``frame``.
     """
-    shown, panels = runs.shown(experiment), []
-    reduced = runs.reduced(shown)
-    errors = errors[errors.scene == experiment.scene]
-    own = errors[(errors.group == experiment.group) & (errors.position_basis == "full")]
-    for method, found in reduced.items():
-        drawn = [panel for panel in found if panel.positions is not None] or found
-        rows = own[own.method == method]
-        panels += [_with_error(each, method, rows, "r") for each in drawn[-len(runs.ranks) :]]
-    if sampled := subspace and _subspace(shown.frame, subspace):
-        own = errors[(errors.position_basis == "pod") & (errors.method == TOLERANCE)]
-        panels.append(_with_error(sampled, "ecsw", own, "k"))
-    seen = [panel for found in reduced.values() for panel in found]
-    return shown.row(shown.when.splitlines()[-1], panels, seen)
-
-
-def _with_error(panel: RunPanel, method: str, rows: pd.DataFrame, size: str) -> RunPanel:
-    """Return ``panel`` titled by method and ``size`` (r or k); below it, the error in ``rows``."""
-    number = int(panel.title.split()[2])
-    error = rows[rows[size] == number].relative_error_within_horizon.dropna()
-    remark = f"error {error.iloc[0]:.2g}" if len(error) else panel.remark
-    return replace(panel, title=f"{method}, {size} = {number}", remark=remark)
-
-
-def _subspace(frame: int, path: str) -> RunPanel | None:
-    """Panel of the run in the largest position subspace up to `MODES` modes; None without one."""
-    colour = style.surface_colour(style.GREEN)
     with open_hdf5(path) as file:
         models = file["models"]
-        sizes = [k for k in range(MODES, 0, -1) if f"pod_k{k:03d}_{TOLERANCE}" in models]
-        if not sizes:
-            return None
-        title, base = f"k = {sizes[0]}", f"pod_k{sizes[0]:03d}"
-        stored = models[f"{base}_{TOLERANCE}"]["train"]["coordinates"]
+        k = next(k for k in range(MODES, 0, -1) if f"pod_k{k:03d}_{TOLERANCE}" in models)
+        stored = models[f"pod_k{k:03d}_{TOLERANCE}"][FIRST]["coordinates"]
         if len(stored) <= frame:
-            return RunPanel(title, colour, None, "blew up")
-        return RunPanel(title, colour, file["columns"][base]["B"][...] @ stored[frame])
+            return k, None
+        return k, file["columns"][f"pod_k{k:03d}"]["B"][...] @ stored[frame]

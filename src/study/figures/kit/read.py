@@ -37,6 +37,7 @@ class RerunInfo:
     full : whether r is the numerical rank of the snapshots
     marked : whether r exceeds that rank, so that nothing ran
     blowup_frame : frame at which the run blew up, -1 if it did not
+    every : the positions of frames 0, every, 2 every, ... are stored
     """
 
     path: str
@@ -45,6 +46,7 @@ class RerunInfo:
     full: bool
     marked: bool
     blowup_frame: int
+    every: int = 1
 
     @property
     def title(self) -> str:
@@ -52,13 +54,13 @@ class RerunInfo:
         return f"r = {self.r} (full rank)" if self.full else f"r = {self.r}"
 
     def at(self, frame: int) -> tuple[int, np.ndarray] | None:
-        """Index and positions (N, 3) m of the last finite frame up to ``frame``, or None."""
+        """Number and positions (N, 3) m of the last finite frame up to ``frame``, or None."""
         with open_hdf5(self.path) as file:
             stored = file[self.label]["positions"]
-            for entry in range(min(frame, len(stored) - 1), -1, -1):
+            for entry in range(min(frame // self.every, len(stored) - 1), -1, -1):
                 positions = np.asarray(stored[entry], dtype=float)
                 if np.isfinite(positions).all():
-                    return entry, positions
+                    return entry * self.every, positions
         return None
 
     def panel(self, frame: int, colour: Colour) -> RunPanel:
@@ -87,15 +89,16 @@ def rerun_infos(path: str, inside: str = "") -> list[RerunInfo]:
                 full=bool(group.attrs.get("full", False)),
                 marked=bool(group.attrs["marked"]),
                 blowup_frame=int(group.attrs.get("blowup_frame", -1)),
+                every=int(group.attrs.get("every", 1)),
             )
             for label, group in file[f"/{inside}"].items()
             if "marked" in group.attrs
         ]
 
 
-def choose_ranks(infos: list[RerunInfo], asked: tuple[int | str, ...]) -> list[RerunInfo]:
-    """Select runs by basis sizes ``asked`` ("full": the rank), in that order; all if none match."""
-    chosen = [i for rank in asked for i in infos if (i.full if rank == "full" else i.r == rank)]
+def choose_ranks(infos: list[RerunInfo], wanted: tuple[int | str, ...]) -> list[RerunInfo]:
+    """Select runs by basis sizes ``wanted`` ("full": the rank), in that order; all if none match."""
+    chosen = [i for rank in wanted for i in infos if (i.full if rank == "full" else i.r == rank)]
     return list(dict.fromkeys(chosen)) or infos
 
 
