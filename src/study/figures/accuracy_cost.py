@@ -94,19 +94,21 @@ BARE = "without the time of the vertices"
 
 
 @figure(
-    title="Alternatives to projective dynamics", reads={"table": TableOf("alternatives")},
+    title="Error against time for each mesh", reads={"table": TableOf("alternatives")},
     timed=True,
 )  # fmt: skip
 def alternatives(table: pd.DataFrame) -> Figure:
-    r"""Position error over all frames against the converged step of the same mesh, and time per
-    frame with the positions of all vertices, on the first test trajectory. A time of 1 is that of
-    plain projective dynamics with ten iterations. Black: the best settings of the full-order model,
-    whose other settings are the grey dots; orange: on coarser meshes, whose displacement is
-    interpolated to all vertices. Green and blue: the reduced model (ecsw), trained on one or on
-    several trajectories; dotted: without the time of the vertices. Dashed: the training trajectory,
-    replayed. Dash-dotted: the error of the mesh itself, by Richardson's rule on three meshes (drawn
-    if the observed order is 0.5 to 3); a smaller error buys no accuracy. $\times 100$: stiffer
-    weights; *: recorded by the extended study. Errors outside are drawn on the rim.
+    r"""On most meshes one of the full-order settings or a coarser mesh reaches the error of the
+    reduced models in less time. Position error over all frames of the first test trajectory,
+    against the converged step of the same mesh, and time per frame with the positions of all
+    vertices, divided by the time of ten plain local/global iterations. Black: the best full-order
+    settings (all others are the grey dots); orange: the best settings on coarser meshes, whose
+    displacement is interpolated to all vertices. Green: the reduced model (ECSW), pale with one
+    training trajectory, dark with several; dotted: without the time of the vertices. Dashed: the
+    error of replaying the training trajectory. Dash-dotted: the error of the mesh itself, by
+    Richardson's rule on three meshes, where the observed order is .5 to 3; a smaller error of a
+    solver has no value. $\times 100$: weights a hundred times as large; *: some rows were recorded
+    earlier or on another machine. Errors outside the axis are drawn on its limits.
     """
     table = table[table.motion == FIRST]
     cases = table.groupby(["scene", "factor", "stiffness"])
@@ -120,7 +122,7 @@ def alternatives(table: pd.DataFrame) -> Figure:
     label_outer(axes, beside, "time / plain frame", y="position error")
     drawn = BEST | {label: colour for label, (_, colour) in TRAINED.items()}
     lines = [style.handle(BARE, color=style.GREEN, linestyle=":")]
-    lines.append(style.handle("training trajectory replayed", color="#555555", linestyle="--"))
+    lines.append(style.handle("replaying the training trajectory", color="#555555", linestyle="--"))
     lines.append(style.handle("error of the mesh itself", **MESH_ERROR))
     looks = {label: (colour, "o") for label, colour in drawn.items()}
     style.legend(figure, [*style.handles(looks), *lines], 3)

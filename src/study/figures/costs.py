@@ -5,9 +5,18 @@ import pandas as pd
 
 from pdrom.view import style
 from pdrom.view.artists import Artist, Axes, Figure
+from study.artifact import words
 from study.artifact.reads import TableOf
 from study.experiments.kit.base import REST
-from study.figures.kit.declaration import GROUPS, MESHES, Drawn, figure, held, method_styles
+from study.figures.kit.declaration import (
+    GROUPS,
+    MESHES,
+    METHODS,
+    Drawn,
+    figure,
+    held,
+    method_styles,
+)
 from study.figures.kit.multiples import label_outer, label_rows, plain_ticks, small_multiples
 
 # Phases of a frame: (label, colour). The first two form the local step, whose share is printed.
@@ -20,30 +29,28 @@ PHASES = {
 TITLES = {"interpreted": "interpreted loop", "numpy": "vectorised NumPy", "compiled": "compiled"}
 CLAIM = 70.0  # per cent of the time of a frame in the local step, by claim C1 of the preprint
 CURVES = {
-    "ms_per_iteration": ("whole iteration", "-"),
+    "ms_per_iteration": ("complete iteration", "-"),
     "local_ms": ("local step", "--"),
     "global_ms": ("global solve", ":"),
     "vertices_ms": ("positions of all vertices", "-."),
 }
 # Method -> legend entry; beside its curve stands p of the fit time ~ (number of vertices)^p.
-NAMES = {"fom": "full order", "ecsw": "POD subspace, ecsw"}
-SCALED = {"fom": (style.BLACK, "o"), "ecsw": ("#1B6E6E", ">")}
+NAMES = {"fom": words.method("full"), "ecsw": words.method("ecsw")}
 ROOM = 2.6  # the axis ends at this multiple of the largest mesh size, to leave space for text
 COLUMNS = 3  # panels in a row of figure `break_even`
 
 
 @figure(
-    title="Where the time of a frame goes", reads={"table": TableOf("local_share")},
+    title="Shares of the time of a frame", reads={"table": TableOf("local_share")},
     scenes=f"cloth_all spring_oop strain_oop bar_release {MESHES}", timed=True,
 )  # fmt: skip
 def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Share of the local step and of the global solve in the time of a full-order frame, for three
-    implementations of the same local step; grey is the rest of the frame, such as prediction and
-    contacts. The printed number is the share of the local step, that is of both shades of orange:
-    the projections and the right-hand side that is assembled from them, in one pass where they are
-    compiled. The dashed line is the 70 % of claim C1; beside the
-    bar stands the time per frame. An interpreted loop confirms the claim everywhere, compiled code
-    only where projections are expensive.
+    """The local step takes most of a frame if it is interpreted; in compiled code it does so only
+    where a projection is expensive. Shares of the time of a full-order frame for three
+    implementations of the same local step. The printed percentage is the share of the local step
+    (both shades of orange: the projections, and the right-hand side that is assembled from them, in
+    one pass where they are compiled). Grey is the rest of the frame, such as the prediction and
+    contacts. The dashed line is the 70 % of claim C1; beside each bar stands the time per frame.
     """
     scenes = drawn.scenes_of(table)
     present = set(table[table.scene.isin(scenes)].implementation)
@@ -54,7 +61,7 @@ def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
         rows = table[table.implementation == implementation].drop_duplicates("scene")
         _draw_bars(ax, rows.set_index("scene"), scenes)
         ax.set(title=TITLES[implementation], xlabel="share of a frame (%)")
-    label_rows(axes[0], scenes)
+    label_rows(axes[0], [words.scene(scene) for scene in scenes])
     handles: list[Artist] = [style.patch(label, color=c) for label, c in PHASES.values()]
     line = {"color": style.BLACK, "linestyle": "--"}
     handles.append(style.handle(f"{CLAIM:.0f} % (claim C1)", **line))
@@ -73,8 +80,8 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
         ax.barh([y] * 4, shares, left=np.cumsum(shares) - shares, color=colours, height=0.72)
         printed = f"{100.0 * rows.local_share[scene]:.0f} %"
         ax.text(2.0, y, printed, va="center", ha="left", fontsize=7.5, fontweight="bold")
-        words = f"{total:.2g} ms" if total < 99.5 else f"{total:.0f} ms"
-        ax.text(102.0, y, words, va="center", ha="left", fontsize=7)
+        time = f"{total:.2g} ms" if total < 99.5 else f"{total:.0f} ms"
+        ax.text(102.0, y, time, va="center", ha="left", fontsize=7)
     ax.axvline(CLAIM, color=style.BLACK, linewidth=1.0, linestyle="--")
     ax.set(xlim=(0, 100), xticks=[0, 25, 50, 75, 100])
     ax.tick_params(axis="y", length=0)
@@ -85,18 +92,19 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
     scenes=f"strain_oop spring_oop bar_release {MESHES}", timed=True,
 )  # fmt: skip
 def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Time of one local/global iteration against the number of vertices: the full-order run, the
-    same with only the local step reduced, and the hyper-reduced run in a position subspace, with
-    the positions of all vertices as a line of its own. Beside the ends of curves stands the
-    exponent of a fitted power law, where there are three sizes of the mesh or more.
+    """The time of a full-order iteration grows with the mesh, that of the reduced model hardly.
+    Time of one local/global iteration against the number of vertices: full-order model, the same
+    with reduced projections only, and reduced positions with sampled elements; the time of the
+    positions of all vertices is a separate line. Beside the curves stands the exponent of a fitted
+    power law, where there are three mesh sizes or more.
     """
     scenes = drawn.scenes_of(table)
-    figure, looks = style.new_figure(2.9), method_styles({*table.method}) | SCALED
+    figure, looks = style.new_figure(2.9), method_styles({*table.method}) | {"fom": METHODS["full"]}
     times = figure.subplots(1, len(scenes), sharex=True, sharey=True, squeeze=False)[0]
     for ax, scene in zip(times, scenes, strict=True):
         rows = table[table.scene == scene].sort_values("vertices")
         _draw_times(ax, rows, looks)
-        ax.set(title=style.words(scene), xlabel="vertices")
+        ax.set(title=words.scene(scene), xlabel="vertices")
     sizes = table[table.scene.isin(scenes)].vertices
     times[0].set_xlim(0.75 * sizes.min(), ROOM * sizes.max())
     for axis in (times[0].xaxis, times[0].yaxis):  # all panels share the axes of the first panel
@@ -121,19 +129,20 @@ def _draw_times(ax: Axes, rows: pd.DataFrame, looks: dict[str, tuple[str, str]])
         end = part.iloc[-1]
         if method in NAMES and end.exponent == end.exponent:
             at, look = (end.vertices, end.ms_per_iteration), {"va": "center", "fontsize": 7.5}
-            words = rf"$N^{{{end.exponent:.2f}}}$"
-            ax.annotate(words, at, (5, 0), textcoords="offset points", color=colour, **look)
+            power = rf"$N^{{{end.exponent:.2f}}}$"
+            ax.annotate(power, at, (5, 0), textcoords="offset points", color=colour, **look)
 
 
 @figure(
-    title="When a reduced local step stops paying", reads={"table": TableOf("breakeven")},
+    title="Reduced against full local step", reads={"table": TableOf("breakeven")},
     methods="deim deim-joint block-deim gappy", timed=True,
 )  # fmt: skip
 def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Time of the reduced local step over that of the full one, both compiled and on one thread,
-    against the number $r$ of basis vectors; one line per scene and method, timed alone on states of
-    the full-order run. Above the dashed line the reduction costs more than all projections. Lines
-    end at the numerical rank.
+    """A reduced local step is faster than the full one up to a basis size that depends on the cost
+    of a projection. Time of the reduced local step divided by that of the full one, both compiled
+    and on one thread, against the number $r$ of basis vectors; one line per scene and method, timed
+    separately from the rest of a frame on states of the full-order simulation. Above the dashed
+    line the reduction is slower. Lines end at the numerical rank.
     """
     table = held(drawn.rows(table).query("factor == 1.0"))
     groups = [group for group in GROUPS if (table.group == group).any()]
@@ -150,7 +159,7 @@ def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
             look = {"marker": marker, "markersize": 2.6, "linewidth": 0.8, "alpha": 0.75}
             ax.plot(curve.r, curve.ratio, color=colour, **look)
         ax.set_xlim(left=0.0)
-    label_outer(axes, COLUMNS, "basis vectors r", "reduced over full local step")
+    label_outer(axes, COLUMNS, "basis vectors r", "reduced / full local step")
     one = style.handle("break-even", color=style.BLACK, linestyle="--")
     style.legend(figure, [*drawn.handles(styles), one], 3)
     return figure

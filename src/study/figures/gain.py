@@ -1,6 +1,6 @@
-"""Figures of errors against gain, method and basis size; figure of singular values.
+"""Figures of errors against DEIM constant, method and basis size; figure of singular values.
 
-The gain is the factor by which sampling amplifies errors.
+Columns named gain hold the DEIM constant, by which sampling may amplify errors.
 """
 
 from itertools import cycle
@@ -18,26 +18,27 @@ from study.figures.kit.declaration import GROUPS, MESHES, Drawn, Experiment, fig
 from study.figures.kit.multiples import label_outer, label_rows, small_multiples
 from study.tables.kit.results import FAILED, judged_runs
 
-GAINS = (1.0, 1e5)  # limits of the gain axis; points outside are drawn on the limits
+GAINS = (1.0, 1e5)  # limits of the axis of constants; points outside are drawn on the limits
 ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-3, 30.0)
 ENDS = ("low", "median", "high")
-DECADES = 4  # bars, one for each decade of the gain from 1 on; one more bar: all larger gains
+DECADES = 4  # bars, one for each decade of the constant from 1 on; one more bar: all larger ones
 _KEYS = ["scene", "group", "method", "r"]
 
 
 @figure(
-    title="Error of the run against the gain",
+    title="Errors against the DEIM constant",
     reads={
         "reruns": TableOf("reduced_reruns"), "errors": TableOf("reconstruction_error"),
         "repetitions": TableOf("repetitions"),
     },
 )  # fmt: skip
 def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
-    """Left: every run of a sampled method whose basis suffices (the orthogonal projection does not
-    fail at the same size), over all scenes and sizes. Dashed: the error from which on a run counts
-    as failed. Arrows on the rim lie outside the axes. Crosses: range and median over runs, in some
-    scenes, that are trained on as many resampled frames. Right: how many of them failed, by decade
-    of the gain.
+    """Most simulations with a large DEIM constant fail, and few with a small one. Left: every
+    simulation by a sampled method whose basis suffices (the orthogonal projection of the same size
+    does not fail), over all scenes and sizes. The dashed line is the error from which on a
+    simulation counts as failed; arrows lie outside the axes. Crosses are ranges and medians over
+    simulations, in some scenes, that are trained on as many resampled frames. Right: share of
+    failing simulations by decade of the constant.
     """
     runs = drawn.rows(judged_runs(tables["reruns"], tables["errors"]))
     figure = style.new_figure(3.0)
@@ -52,11 +53,11 @@ def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
         own = runs[runs.method == method]
         _draw_method(left, own, ranges[ranges.method == method], *look)
     style.log_axis(left, *ERRORS)
-    left.set(xscale="log", xlim=GAINS, xlabel="gain of the interpolation")
-    left.set_ylabel("error within the horizon (relative)")
+    left.set(xscale="log", xlim=GAINS, xlabel="DEIM constant")
+    left.set_ylabel("position error before the horizon")
     left.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
     left.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7)
-    left.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "ended early: upper rim", va="top", fontsize=7)
+    left.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "blown up: upper limit", va="top", fontsize=7)
     _draw_decades(right, runs)
     style.legend(figure, drawn.handles(styles, linestyle="none"), 4)
     return figure
@@ -82,8 +83,8 @@ def _draw_method(
 
 
 def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
-    """Draw for each decade of the gain (error amplification): % of failed runs, number of runs."""
-    # the last bar has all larger gains, including infinite ones
+    """Draw for each decade of the constant: per cent of failed runs, number of runs."""
+    # the last bar has all larger constants, including infinite ones
     upper = np.ceil(np.log10(runs.gain.clip(upper=10.0**DECADES + 1.0))).clip(lower=1)
     decades = runs.groupby(upper.astype(int)).failed.agg(["size", "mean"])
     places = np.arange(len(decades))
@@ -95,8 +96,8 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     ax.set_xticks(places, list(spans.values()))
     ax.set(ylim=(0, 112), yticks=[0, 25, 50, 75, 100])
     ax.tick_params(axis="x", labelrotation=35)
-    ax.set(xlabel="gain of the interpolation", ylabel="failed runs (%)")
-    ax.set_title("number of runs above each bar")
+    ax.set(xlabel="DEIM constant", ylabel="failing simulations (%)")
+    ax.set_title("number of simulations above each bar")
     ax.grid(True)
 
 
@@ -160,7 +161,10 @@ def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
 VALUES = (1e-17, 3.0)
 SHOWN = (1e-7, 1e3)  # limits of the error axis; errors outside are drawn on the limits
 # Set of snapshots -> legend entry and line style.
-SPLITS = {"train": ("train", "-"), "test": ("test", "--"), "heldout": ("held-out run", ":")}
+SPLITS = {
+    "train": ("training frames", "-"), "test": ("frames between them", "--"),
+    "heldout": ("test 1", ":"),
+}  # fmt: skip
 PUBLISHED = "#B5B5B5"
 PUBLISHED_CODE = "config/reference/published_code"
 # Scene -> similar experiment of the published code, which is drawn beside it.
@@ -201,9 +205,10 @@ def _published(path: Path, columns: list[str], each: Experiment) -> pd.DataFrame
     f"strain_stretch strain_twist strain_poke strain_oop bar_release bar_twist {MESHES}",
 )  # fmt: skip
 def singular_values(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
-    """Singular values of the training snapshots, relative to the first. Hollow ones lie below the
-    round-off of the projections and are noise. Grey lines are the output of the published code for
-    the scene that comes closest.
+    """The singular values of the training snapshots decay, unless the projections are rounding
+    errors. Values relative to the first; hollow marks lie below the rounding errors of the
+    projections and are noise. Grey lines are the output of the preprint's code for the most similar
+    scene.
     """
     figure, panels = _panels(drawn, table, VALUES, 4, legend=2)
     reference = False
@@ -217,9 +222,9 @@ def singular_values(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figur
         _draw_values(ax, rows.sort_values("component"), *GROUPS[each.group])
     label_outer([ax for ax, *_ in panels], 4, "component", "singular value / first")
     handles = style.handles({style.words(e.group): GROUPS[e.group] for _, e, _ in panels})
-    handles.append(style.handle("below round-off", linestyle="none", marker="o", **HOLLOW))
+    handles.append(style.handle("below rounding errors", linestyle="none", marker="o", **HOLLOW))
     if reference:
-        handles.append(style.handle("published code's output", color=PUBLISHED))
+        handles.append(style.handle("preprint's code", color=PUBLISHED))
     style.legend(figure, handles, 4)
     return figure
 
@@ -233,9 +238,9 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
     if not above.all():
         limit = np.sqrt(shown[~above].max() * shown[above].min()) if above.any() else VALUES[1]
         ax.axhspan(VALUES[0], limit, color=REGION, linewidth=0.0, zorder=0)
-        words = {"fontsize": 7.5, "color": "#6B675F", "style": "italic"}
-        text = "round-off" if above.any() else "all of it round-off"
-        ax.text(0.03, 0.04, text, transform=ax.transAxes, **words)
+        look = {"fontsize": 7.5, "color": "#6B675F", "style": "italic"}
+        text = "rounding errors" if above.any() else "rounding errors only"
+        ax.text(0.03, 0.04, text, transform=ax.transAxes, **look)
     ax.plot(component[above], shown[above], color=colour, linewidth=0.8)
     for mask, marks in ((above, {"color": colour}), (~above, HOLLOW | {"markeredgewidth": 0.5})):
         dots = marks | {"linestyle": "none", "markersize": 2.8, "clip_on": False}
@@ -245,7 +250,7 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
 
 
 @figure(
-    number=8, title="Reconstruction error of three scenes of the preprint",
+    number=8, title="Reconstruction error",
     reads={
         "table": TableOf("reconstruction_error"),
         "published": ProjectFile(f"{PUBLISHED_CODE}/reconstruction_error.csv"),
@@ -253,9 +258,11 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
     methods="pod deim deim-joint published block-deim",
 )  # fmt: skip
 def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
-    """Relative error of reconstructed projections against the number $r$ of basis vectors, for the
-    snapshots used (train), the frames between them (test) and another run (held out). Errors above
-    the axis are drawn on its rim with an arrow head.
+    """The reconstruction error of the preprint's variants stays high, while one system for all
+    coordinates follows the orthogonal projection on training frames. Relative error of
+    reconstructed projections against the number $r$ of basis vectors, for the frames used in
+    training, the frames between them, and the first test trajectory. Errors above the axis are
+    drawn on its limit with an arrow head.
     """
     styles = drawn.styles(table)
     figure, panels = _panels(drawn, table, SHOWN, 3, legend=3)
@@ -270,15 +277,15 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
             ax.plot(output.num_points, error, color=PUBLISHED, linewidth=0.7, zorder=1)
         lines = [_draw_errors(ax, rows[rows.method == m], *styles[m]) for m in styles]
         if not any(lines):
-            words = "projections are round-off:\nno relative error exists"
+            note = "projections are rounding errors:\nno relative error exists"
             look = {"ha": "center", "va": "center", "color": "#666666", "transform": ax.transAxes}
-            ax.text(0.5, 0.5, words, bbox={"fc": "white", "ec": "none", "pad": 2}, **look)
+            ax.text(0.5, 0.5, note, bbox={"fc": "white", "ec": "none", "pad": 2}, **look)
         ax.set_xlim(0, max(float(rows.r.max()), 1.0) * 1.02)
     label_outer([ax for ax, *_ in panels], 3, "basis size r", "relative error")
     handles = drawn.handles(styles)
-    handles += [style.handle(words, color="#555555", linestyle=s) for words, s in SPLITS.values()]
+    handles += [style.handle(text, color="#555555", linestyle=s) for text, s in SPLITS.values()]
     if reference:
-        label = "published code's output (x, y)"
+        label = "preprint's code (x, y)"
         handles.append(style.handle(label, color=PUBLISHED, linewidth=1.0))
     style.legend(figure, handles, 4)
     return figure

@@ -26,8 +26,8 @@ from study.figures.kit.read import choose_ranks, positions_at, rerun_infos
 from study.figures.sensitivity_floor import FLOORS, floors_of
 from study.tables.errors import VOLUMES
 
-NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "one vertex across"}
-NOTHING_RAN = "not run: the projections are round-off, there is nothing to reduce"
+NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "plane and one vertex"}
+NOTHING_RAN = "not run: the projections are rounding errors, there is nothing to reduce"
 WRONG = 0.1  # a run has failed if its relative error exceeds this, or if it blew up
 DISTANCES = (1e-4, 1.0)  # limits of colours: distance from full order / longest side of mesh
 FOOTER = 0.55  # height of the colour scale, inches
@@ -44,8 +44,10 @@ RUNS: dict[str, Read] = {
     "reruns": EachOf(RERUNS, "drawn.runs"),
     **FLOORS,
 }
-COMPARED = """full order against reduced projections, by basis size. The grey outline is the
-full-order run at the same instant; a framed picture is drawn to the smaller scale given below it.
+COMPARED = """with one system per coordinate (preprint's selection) most simulations are distorted
+or blow up; element-wise DEIM is better. The full-order model and reduced projections in one frame
+of the training trajectory, by basis size; the grey outline is the full-order model. A framed
+picture is drawn to the smaller scale given below it.
 """
 
 
@@ -79,7 +81,7 @@ class Shown:
         if not any(panel.began for panel in seen):
             note, panels = NOTHING_RAN, [panel for panel in panels if panel.began]
         window = view.shared_window(self.camera, self.full[0], seen)
-        first = RunPanel("full order", style.FULL_ORDER, self.full[0], reference=True)
+        first = RunPanel("full-order model", style.FULL_ORDER, self.full[0], reference=True)
         panels = [replace(panel, obstacles=self.bodies) for panel in (first, *panels)]
         label, windows = f"{self.experiment.title}\n{label}", [window] * len(panels)
         ghosts = np.repeat(self.full, len(panels), axis=0)
@@ -114,7 +116,7 @@ class Runs:
             load_mesh(experiment.find(self.meshes)),
             camera_of(experiment),
             frame,
-            f"frame {frame}" if end is None or frame <= end else f"frame {frame}\npast horizon",
+            f"frame {frame}" if end is None or frame <= end else f"frame {frame}\nbeyond horizon",
             full,
             style.surface_colour(GROUPS[experiment.group][0]),
             obstacles_of(experiment, full),
@@ -158,7 +160,7 @@ def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | 
     groups=" ".join(VOLUMES),
 )  # fmt: skip
 def bar_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Bars with tetrahedral constraints:"""
+    """Bars of tetrahedra:"""
     return Runs(drawn, horizon, RANKS, (0.65,), **files).draw()
 
 
@@ -167,7 +169,7 @@ def bar_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     scenes="spring_stretch spring_twist ball_shell", methods=PAIR, groups="spring",
 )  # fmt: skip
 def spring_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Sheets with edge springs only:"""
+    """Sheets with springs only:"""
     return Runs(drawn, horizon, RANKS, (0.3,), **files).draw()
 
 
@@ -177,7 +179,7 @@ def spring_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     groups="strain area",
 )  # fmt: skip
 def strain_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Sheets with triangle strain only:"""
+    """Sheets with strain on triangles only:"""
     return Runs(drawn, horizon, RANKS, (0.3,), **files).draw()
 
 
@@ -187,12 +189,12 @@ def strain_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     scenes="bend_fall bend_poke bend_curved", methods=PAIR, groups="bending",
 )  # fmt: skip
 def bending_runs(drawn: Drawn, horizon: Horizon, noise: pd.DataFrame, **files: Files) -> Figure:
-    """Sheets with bending constraints only, near the end of the run: full order against reduced
-    projections. The projections of a flat sheet are round-off: in the preprint's two scenes the
-    basis is one of noise, and what it does depends on which axes the round-off of the start reaches
-    (drawn is the first start of which some sizes run and others do not, or else the first; all are
-    counted below the pictures and in the figure of reductions on bases of round-off). The curved
-    sheet has projections that matter.
+    """The projections of a flat sheet are rounding errors, so that a basis of them is noise: in the
+    preprint's two scenes a reduced simulation survives or fails by the coordinates that the initial
+    rounding errors reach. The curved sheet has projections that matter. Sheets with bending only,
+    near the end of the simulation: the full-order model and reduced projections by basis size.
+    Drawn is the first perturbed start for which some sizes run and others do not, or else the
+    first; below each picture stands the number of failing starts.
     """
     noise_runs = files.pop("noise_runs")
     runs, rows = Runs(drawn, horizon, RANKS, (0.6,), **files), []
@@ -238,12 +240,11 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
     methods=PAIR, several=True,
 )  # fmt: skip
 def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """The cloth with bending, springs and strain at instants up to the scene's horizon, beyond
-    which no difference could be blamed on a reduction: the full-order run, then runs that reduce
-    the projections of one group only, by two methods. Triangles are coloured by their distance to
-    the full-order run, whose outline is grey; a framed picture is drawn to the smaller scale given
-    below it. Springs carry nearly all of the force, so that reducing strain changes little whatever
-    the method.
+    """Reducing strain changes little in this scene, whatever the method, since springs carry nearly
+    all of the force. The cloth with bending, springs and strain in frames up to its horizon: the
+    full-order model, then simulations with the projections of one group reduced by two methods.
+    Colours are distances to the full-order model, whose outline is grey; a framed picture is drawn
+    to the smaller scale given below it.
     """
     # instants as fractions of the horizon
     runs = Runs(drawn, horizon, (20, 10, "full"), (0.5, 0.75, 1.0), **files)
@@ -262,7 +263,7 @@ def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     def row(label: str, panels: list[RunPanel], note: str | None) -> Row:
         return Row(label, mesh, panels, windows, ghosts, camera, note)
 
-    rows = [row("full order", first * len(drawn.methods), None)]
+    rows = [row("full-order model", first * len(drawn.methods), None)]
     for each in drawn.of(one.scene):
         reduced = [
             _over_time(each.find(runs.reruns, method=m), runs, drawn.title(m), frames, full, mesh)
@@ -276,7 +277,7 @@ def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     inch = 1.0 / made.get_figheight()
     ax = made.add_axes((0.3, 0.40 * inch, 0.5, 0.08 * inch))
     bar = made.colorbar(_colours(), cax=ax, orientation="horizontal", extend="both")
-    bar.set_label("distance to the full-order run (extents)", labelpad=1)
+    bar.set_label("distance to the full-order model / size of the mesh", labelpad=1)
     bar.outline.set_linewidth(0.4)
     return made
 
@@ -355,7 +356,9 @@ def _teaser_row(
     if path := experiment.find(files["subspaces"]):
         sizes["k"], positions = _subspace(frame, path)
         rows = table[(table.method == TOLERANCE) & (table.k == sizes["k"])]
-        shown = RunPanel("", colours["ecsw"], positions, None if positions is not None else "blew up")
+        shown = RunPanel(
+            "", colours["ecsw"], positions, None if positions is not None else "blew up"
+        )
         title = words.method(TOLERANCE).partition(" (")[0]
         panels.append(_with_numbers(shown, title, rows))
     time = (table.ms_per_frame * table.speedup).median()

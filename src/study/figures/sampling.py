@@ -59,11 +59,11 @@ class Iteration:
 def deim_iterations(
     drawn: Drawn, meshes: list[File], bases: list[File], samples: list[File]
 ) -> Figure:
-    """In step $k$ the residual of mode $k$ is taken against the modes before it, interpolated at
-    the entries picked so far, and the entry where it is largest in absolute value is picked next.
-    An element has the colour of its largest entry, so that the ringed one, which holds the picked
-    entry, is the darkest; white dots are elements picked before. Each step asks for one number,
-    whose whole element has to be projected for it.
+    """Each step of DEIM selects one entry, although the projection of a complete element has to be
+    computed for it. In step $k$ the mode $k$ is interpolated by the modes before it at the entries
+    selected so far; the entry with the largest absolute residual is selected next. The colour of an
+    element is the largest residual among its entries; the ring marks the selected element, white
+    dots those of earlier steps.
     """
     experiment, method, path = drawn.experiments[0], drawn.methods[0], samples[0].path
     basis, samplings = load_basis(bases[0].path), read_samplings(path)
@@ -91,7 +91,7 @@ def deim_iterations(
         set_window(ax, window)
     bar = figure.colorbar(colours, ax=axes, aspect=25, pad=0.01, fraction=0.03)
     bar.set_label("residual of the element / largest")
-    dots = {"picked before": EARLIER, "picked in this step": NEWEST}
+    dots = {"selected before": EARLIER, "selected in this step": NEWEST}
     marks = {"linestyle": "none", "marker": "o"}
     style.legend(figure, [style.handle(label, **marks, **d) for label, d in dots.items()], 2)
     return figure
@@ -124,7 +124,7 @@ def iterations(
 
 
 @figure(
-    number=3, title="Elements hit by the entries of vectorised DEIM",
+    number=3, title="Elements that entry-wise DEIM samples",
     reads={
         "meshes": EachOf(MESH, "drawn.experiments"),
         "snapshots": EachOf(SNAPSHOTS, "drawn.experiments"),
@@ -134,10 +134,11 @@ def iterations(
     methods="deim qdeim block-deim",
 )  # fmt: skip
 def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
-    """Single entries, picked without regard to elements, scatter over the mesh. Left: the elements
-    they belong to, by axis. Middle: how many of its entries each touched element contributes.
-    Right: numbers that have to be computed for $r$ interpolation entries, because a projection
-    yields all entries of its element at once.
+    """The entries that DEIM selects without regard to elements lie on many elements, so that many
+    more entries are computed than used. Left: sampled elements of entry-wise DEIM, coloured by
+    coordinate. Middle: numbers of elements by how many of their entries are used. Right: entries
+    that have to be computed for a basis of size $r$, since a projection yields all entries of its
+    element at once.
     """
     scalar = [m for m, reduction in drawn.reductions.items() if reduction.rows == "scalar"]
     read = [
@@ -167,7 +168,7 @@ def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
         for axis, colour in AXES.items()
     ]
     handles += drawn.handles(drawn.looks)
-    handles.append(style.handle("numbers that DEIM uses (r)", color=style.GREY, linestyle="--"))
+    handles.append(style.handle("entries that DEIM uses (r)", color=style.GREY, linestyle="--"))
     style.legend(figure, handles, 4)
     return figure
 
@@ -216,7 +217,7 @@ def _draw_evaluations(
             ax.plot(list(sizes), computed, color=colour, marker=marker, markevery=every)
             largest = max(largest, *sizes)
     ax.plot([0, largest], [0, largest], color=style.GREY, linewidth=0.9, linestyle="--")
-    ax.set(xlim=(0, None), ylim=(0, None), xlabel="basis size r", ylabel="numbers computed")
+    ax.set(xlim=(0, None), ylim=(0, None), xlabel="basis size r", ylabel="entries computed")
     ax.grid(True)
 
 
@@ -235,11 +236,11 @@ LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures of the me
     }, scenes=SCENES, methods="deim block-deim pod",
 )  # fmt: skip
 def snapshots_and_modes(drawn: Drawn, **files: list[File]) -> Figure:
-    """The snapshots of one constraint group, a column each, less their mean, are the product of
-    modes, singular values (a diagonal, dark where large) and coefficients; red entries are
-    positive, blue ones negative. Below, columns of the first matrix on the moving mesh and the
-    first modes on the mesh at rest: an element has the colour of one of its entries, whose axis and
-    row are named, relative to the largest.
+    """The snapshots of the projections are the product of modes, singular values and coefficients.
+    Each column of the left matrix is a snapshot less the mean; singular values are the diagonal,
+    dark where large; red entries are positive, blue ones negative. Below: columns of the first
+    matrix on the moving mesh, and the first modes on the mesh at rest. The colour of an element is
+    one of its entries, whose coordinate and row are named, relative to the largest.
     """
     experiment, path = drawn.experiments[0], files["bases"][0].path
     basis, snapshots = load_basis(path), load_snapshots(files["sets"][0].path)
@@ -334,8 +335,8 @@ def _row(figure: Figure, count: int, bottom: float, height: float, label: str) -
     middle = (bottom + 0.5 * height) / whole
     figure.text(0.008, middle, label, va="center", fontsize=7.5)
     if count == 0:
-        words = "no mode: every snapshot is round-off"
-        figure.text(0.5, middle, words, ha="center", va="center", color="#666666")
+        note = "no mode: all snapshots are rounding errors"
+        figure.text(0.5, middle, note, ha="center", va="center", color="#666666")
     left = LEFT / style.WIDTH
     return [
         figure.add_axes((left + i * step, bottom / whole, step, height / whole))

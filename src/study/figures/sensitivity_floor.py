@@ -26,10 +26,10 @@ def floors_of(
 ) -> dict[str, tuple[np.ndarray, int | None]]:
     """Map each scene to its sensitivity (F,) and its horizon; None: beyond the run.
 
-    The sensitivity is the relative difference between full-order runs with perturbed and unperturbed
-    starts in each of F frames, the largest over all random seeds; it is empty without perturbed
-    runs. The horizon is the first frame in which it exceeds a threshold; from there on runs cannot
-    be compared. Raises StorageError for a damaged file.
+    The sensitivity is the relative difference between full-order runs with perturbed and
+    unperturbed starts in each of F frames, the largest over all random seeds; it is empty without
+    perturbed runs. The horizon is the first frame in which it exceeds a threshold; from there on
+    runs cannot be compared. Raises StorageError for a damaged file.
     """
     found = {}
     for file in sensitivity:

@@ -1,16 +1,20 @@
 """Figure of the stability map: the outcome of every reduced run of the study."""
 
 from dataclasses import dataclass
+from textwrap import fill
 
 import pandas as pd
 
 from pdrom.view import style
 from pdrom.view.artists import Axes, Figure
+from study.artifact import words
 from study.artifact.reads import TableOf
 from study.figures.kit.declaration import Drawn, NothingToDraw, figure
 
 RANKS = (6, 10, 20, "full")  # basis sizes; full stands for the numerical rank
 ROW = 0.145  # height of a row of cells, inches
+SUBSPACES = {"full": "all elements", "ecsw": "sampled elements"}
+TITLE = 13  # longest line of the title of a block, characters
 GAP = 0.45  # distance between blocks of columns, in widths of a cell
 LEAST = 2.0  # smallest width of a block of columns, in widths of a cell, so that its title fits
 
@@ -29,12 +33,12 @@ class Look:
 
 
 LOOKS = {
-    "accurate": Look(style.BLUE, "", "white", "finite and accurate"),
-    "wrong": Look("#F3CB65", "", "black", "finite but wrong"),
+    "accurate": Look(style.BLUE, "", "white", "error below the limit"),
+    "wrong": Look("#F3CB65", "", "black", "finite, error above the limit"),
     "left the scene": Look(style.VERMILLION, "\N{MULTIPLICATION SIGN}", "white", "left the scene"),
     "blow-up": Look("black", "frame", "white", "blow-up (in this frame)"),
     "not run": Look("white", "\N{EN DASH}", "#777777", "not run: beyond the rank"),
-    "not judged": Look("#D9D9D9", "?", "#444444", "not judged: no error within the horizon"),
+    "not judged": Look("#D9D9D9", "?", "#444444", "not judged: no error before the horizon"),
 }
 
 
@@ -60,7 +64,7 @@ class Strip:
             width = len(columns)
             room = max(0.5 * (LEAST - width), 0.0)
             x += room
-            ax.text(x + 0.5 * width, -0.25, title, ha="center", va="bottom", fontsize=6.5)
+            ax.text(x + 0.5 * width, -0.25, title, ha="center", va="bottom", fontsize=7)
             for k, cells in enumerate(columns.values()):
                 ticks.append(x + k + 0.5)
                 for i, key in enumerate(self.rows):
@@ -70,9 +74,9 @@ class Strip:
             x += width + room + GAP
         ax.set(xlim=(0.0, x - GAP), ylim=(len(self.rows), 0.0))
         texts = [label for columns in self.blocks.values() for label in columns]
-        ax.set_xticks(ticks, texts, fontsize=6)
+        ax.set_xticks(ticks, texts, fontsize=7)
         places = [i + 0.5 for i in range(len(self.rows))]
-        ax.set_yticks(places, list(self.rows.values()), fontsize=6.5)
+        ax.set_yticks(places, list(self.rows.values()), fontsize=7)
         ax.tick_params(length=0, pad=2)
         ax.set_xlabel(self.xlabel, fontsize=7)
         ax.set_ylabel("scene", fontsize=7)
@@ -88,19 +92,20 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
     ax.add_patch(Rectangle((x, y), 1.0, 1.0, facecolor=look.face, **edge))
     mark = f"{int(found.blowup_frame)}" if look.mark == "frame" else look.mark
     if mark:
-        ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=6, color=look.ink)
+        ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=7, color=look.ink)
 
 
-@figure(title="Where each method can be trusted", reads={"table": TableOf("stability")})
+@figure(title="Outcome of every reduced simulation", reads={"table": TableOf("stability")})
 def stability_map(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """End of every run on the training motion, by method, size and scene. Accurate or wrong: the
-    error within the horizon is at most, or above, {stability.wrong}; left the scene: the bounding
-    box exceeds {stability.left} times the largest one of the full-order run; blow-up: numbers that
-    are not finite, or an extent beyond the limit, in the frame whose number is printed. Groups
-    whose projections are round-off are left out.
+    """Simulations with one system per coordinate leave the scene at nearly every size; those with one
+    system for all coordinates, and those in position subspaces, seldom. Each cell is a simulation of the training trajectory,
+    by method, size and scene. The limit of the position error before the horizon is
+    {stability.wrong}; left the scene: the bounding box exceeds {stability.left} times the largest
+    one of the full-order model; blow-up: numbers that are not finite, in the frame whose number is
+    printed. Groups whose projections are rounding errors are left out.
     """
     table = table[(table.experiment == "rerun") & (table.group.notna())]
-    strips = [_local_strip(table, drawn), _subspace_strip(table)]
+    strips = [_local_strip(table, drawn), _subspace_strip(table, drawn)]
     strips = [strip for strip in strips if strip.rows and strip.blocks]
     if not strips:
         raise NothingToDraw
@@ -132,21 +137,23 @@ def _local_strip(table: pd.DataFrame, drawn: Drawn) -> Strip:
     largest = ran.sort_values("r", kind="stable").groupby(["scene", "group", "method"]).tail(1)
     blocks = {}
     for method in dict.fromkeys(part.method):
+        title = fill(drawn.title(method), TITLE)
         own, whole = (rows_of[rows_of.method == method] for rows_of in (part, largest))
-        blocks[method] = {str(r): _cells(whole if r == "full" else own[own.r == r]) for r in ranks}
+        blocks[title] = {str(r): _cells(whole if r == "full" else own[own.r == r]) for r in ranks}
     return Strip(rows, blocks, "number of modes r (full: numerical rank)")
 
 
-def _subspace_strip(table: pd.DataFrame) -> Strip:
+def _subspace_strip(table: pd.DataFrame, drawn: Drawn) -> Strip:
     part = table[table.position_basis != "full"]
-    rows = {(scene, "all"): style.words(scene) for scene in dict.fromkeys(part.scene)}
+    rows = {(scene, "all"): words.scene(scene) for scene in dict.fromkeys(part.scene)}
     blocks = {}
     for basis, method in dict.fromkeys(zip(part.position_basis, part.method, strict=True)):
         own = part[(part.position_basis == basis) & (part.method == method)]
-        title = f"{basis}\n{'all' if method == 'full' else method}"
+        title = SUBSPACES.get(method.partition("-")[0]) or drawn.title(method)
+        title = fill(f"{basis.replace('pod', 'POD')}, {title}", TITLE)
         sizes = sorted(own.k.dropna().unique())
         blocks[title] = {str(int(k)): _cells(own[own.k == k]) for k in sizes}
-    label = "number of modes k of the position subspace (all: all projections)"
+    label = "number of modes k of the position subspace"
     return Strip(rows, blocks, label)
 
 

@@ -97,7 +97,7 @@ def rerun_infos(path: str, inside: str = "") -> list[RerunInfo]:
 
 
 def choose_ranks(infos: list[RerunInfo], wanted: tuple[int | str, ...]) -> list[RerunInfo]:
-    """Select runs by basis sizes ``wanted`` ("full": the rank), in that order; all if none match."""
+    """Select runs by sizes ``wanted`` ("full": the rank), in that order; all if none match."""
     chosen = [i for rank in wanted for i in infos if (i.full if rank == "full" else i.r == rank)]
     return list(dict.fromkeys(chosen)) or infos
 
