@@ -28,7 +28,7 @@ CURVES = {
     "gappy": words.method("gappy"),
     SAMPLED: words.method(SAMPLED),
 }
-HEIGHT = 2.6  # of the figure, inches
+HEIGHT = 2.3  # of the figure, inches
 
 
 def curves(table: pd.DataFrame) -> dict[str, pd.DataFrame]:

@@ -55,7 +55,7 @@ def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
     scenes = drawn.scenes_of(table)
     present = set(table[table.scene.isin(scenes)].implementation)
     implementations = [i for i in TITLES if i in present]
-    figure = style.new_figure(0.27 * len(scenes) + 1.35)
+    figure = style.new_figure(0.22 * len(scenes) + 1.3)
     axes = figure.subplots(1, len(implementations), sharey=True, squeeze=False)[0]
     for ax, implementation in zip(axes, implementations, strict=True):
         rows = table[table.implementation == implementation].drop_duplicates("scene")

@@ -21,7 +21,7 @@ LOOKS = {
 WRONG = 0.1  # position error above which a mark is hollow
 APART, BESIDE = 1.045, 1.17  # ratios of x of neighbouring marks of a mesh, and of meshes
 LARGE = 0.5  # the errors are printed of meshes with more than this share of the most vertices
-HEIGHT = 2.9  # of the figure, inches
+HEIGHT = 2.6  # of the figure, inches
 
 
 @figure(
@@ -29,16 +29,15 @@ HEIGHT = 2.9  # of the figure, inches
     timed=True,
 )  # fmt: skip
 def equal_error(table: pd.DataFrame) -> Figure:
-    r"""Reduced positions with sampled elements are faster than solvers on the same large mesh; if
+    """Reduced positions with sampled elements are faster than solvers on the same large mesh; if
     coarser meshes are allowed, they stay ahead on one bar only. Time of the fastest full-order
-    setting whose position error is at most as large, divided by the time of the reduced model
-    (POD subspace, ECSW, five iterations, two training trajectories). Above the line at 1 the
-    reduced model is faster. Each mesh has a mark for each of the three test trajectories, from left
-    to right; vertical lines are bootstrap intervals over processes. The numbers beside the large
-    meshes are the position errors of the reduced model against the converged step; a mark is hollow
-    where the error exceeds 10 %. An arrow: no full-order setting is as accurate, and the mark is a
-    lower bound. A cross: the converged step is not accurate enough to judge. Training times are not
-    included. *: some rows were recorded earlier or on another machine.
+    setting whose position error is at most as large, divided by the time of the reduced model (POD
+    subspace, ECSW, five iterations, two training trajectories; training not included). Each mesh
+    has a mark for each of the three test trajectories, from left to right, with the position errors
+    of the reduced model beside the large meshes; the mark is hollow where the error exceeds 10 %.
+    Vertical lines are bootstrap intervals over processes. Arrow: no full-order setting is as
+    accurate (lower bound); cross: the converged step is not accurate enough to judge; *: some rows
+    were recorded earlier or on another machine.
     """
     table = table[table.iterations.notna() & (table.stiffness == 1.0)]
     table = held(table.dropna(subset=[f"{name}_speedup" for name in AGAINST]).sort_values(MESH))

@@ -18,7 +18,7 @@ PARTS = {
     "run": ("iterations: the same with five iterations", style.GREEN, ">"),
     "full_order": ("full-order model with ten iterations", style.BLACK, "x"),
 }
-ROW = 0.148  # height of a row, inches
+ROW = 0.14  # height of a row, inches
 MARK = {"markersize": 4.2, "markeredgewidth": 1.2, "linestyle": "none"}
 RING = {"markersize": 7.0, "markerfacecolor": "none"}  # the closure, around the sampling
 

@@ -132,7 +132,7 @@ def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
     known = [step for step in STEPS if step in {*table.rung}]
     steps = known or list(dict.fromkeys(table.rung[table.direction == "up"]))
     scenes = [scene for scene in drawn.scenes if scene in {*table.scene}]
-    figure = style.new_figure(0.21 * len(steps) + 1.25)
+    figure = style.new_figure(0.19 * len(steps) + 1.2)
     ax = figure.subplots()
     ax.set(xscale="log", xlim=(LADDER_ERRORS[0], LADDER_ERRORS[1] * 1.1), xlabel="position error")
     ax.grid(True, axis="x")

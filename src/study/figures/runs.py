@@ -33,7 +33,7 @@ DISTANCES = (1e-4, 1.0)  # limits of colours: distance from full order / longest
 FOOTER = 0.55  # height of the colour scale, inches
 # Figure `teaser`: instant as a fraction of the run, number of modes r, limit of k, and tolerance.
 INSTANT, MODES, TOLERANCE = 0.65, 20, "ecsw-1e-02"
-TEASER_ROW = 1.6  # largest height of its rows, inches
+TEASER_ROW = 1.5  # largest height of its rows, inches
 Ranks = tuple[int | Literal["full"], ...]
 PAIR = "deim-joint block-deim"
 RANKS: Ranks = (6, 10, 20, "full")  # basis sizes; full stands for the numerical rank

@@ -41,7 +41,7 @@ def floors_of(
 
 LOW, HIGH = 1e-12, 1e2
 MOST = 6  # largest number of curves
-HEIGHT = 2.5  # of the figure, inches
+HEIGHT = 2.15  # of the figure, inches
 
 
 @figure(

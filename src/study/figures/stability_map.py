@@ -97,12 +97,13 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
 
 @figure(title="Outcome of every reduced simulation", reads={"table": TableOf("stability")})
 def stability_map(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Simulations with one system per coordinate leave the scene at nearly every size; those with one
-    system for all coordinates, and those in position subspaces, seldom. Each cell is a simulation of the training trajectory,
-    by method, size and scene. The limit of the position error before the horizon is
-    {stability.wrong}; left the scene: the bounding box exceeds {stability.left} times the largest
-    one of the full-order model; blow-up: numbers that are not finite, in the frame whose number is
-    printed. Groups whose projections are rounding errors are left out.
+    """Simulations with one system per coordinate leave the scene at nearly every size; those
+    with one system for all coordinates, and those in position subspaces, seldom. Each cell is a
+    simulation of the training trajectory, by method, size and scene. The limit of the position
+    error before the horizon is {stability.wrong}; left the scene: the bounding box exceeds
+    {stability.left} times the largest one of the full-order model; blow-up: numbers that are not
+    finite, in the frame whose number is printed. Groups whose projections are rounding errors are
+    left out.
     """
     table = table[(table.experiment == "rerun") & (table.group.notna())]
     strips = [_local_strip(table, drawn), _subspace_strip(table, drawn)]

@@ -92,8 +92,9 @@ def make_results(results: Invented) -> None:
         positions = np.repeat(mesh.points[None], FRAMES + 1, axis=0)
         positions[:, :, 2] += 0.4 * t * np.sin(4.0 * mesh.points[:, 0])
         positions[:, :, 1] -= 1.5 * t**2
-        with write_hdf5(results.path(paths.TRAIN, scene)) as file:
-            file["positions"] = positions
+        for place in (paths.TRAIN, paths.HELDOUT):
+            with write_hdf5(results.path(place, scene)) as file:
+                file["positions"] = positions
         for group in config.reduce:
             rank = 0 if scene in FLAT else 14
             count = len(EFFECTS.load(group).element_vertices(mesh))
@@ -140,9 +141,10 @@ def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
             moved = positions[: last + 1] + 0.02 / r * rng.standard_normal(positions[0].shape)
             if failed:
                 moved[-1] = np.nan
-            store["positions"] = moved.astype(np.float32)
             blowup = BLOWUP_FRAME if failed else -1
-            store.attrs.update(blowup_frame=blowup)
+            for own, every in ((store, 1), (file.create_group(f"heldout/r{r:04d}"), 4)):
+                own["positions"] = moved[::every].astype(np.float32)
+                own.attrs.update(store.attrs, blowup_frame=blowup, every=every)
 
 
 def reference(name: str) -> pd.DataFrame:

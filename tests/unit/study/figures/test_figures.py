@@ -1,6 +1,7 @@
 """Every figure draws from invented results; what it says about failures and missing data."""
 
 import warnings
+from itertools import pairwise
 from pathlib import Path
 
 import h5py
@@ -15,11 +16,12 @@ from pdrom.core.store import checksum_path, write_hdf5
 from pdrom.core.store.checksum import write_block
 from pdrom.model.effects.forces import Gravity
 from pdrom.model.effects.obstacle import Sphere
-from pdrom.reduction.method import load_methods
-from places import CONFIG
 from study.artifact.paths import RERUNS, SUBSPACES
 from study.figures import accuracy_cost as view
-from study.figures.kit.declaration import Drawn, Reduction, camera_of, declarations, write_figure
+from study.figures import runs as pictures
+from study.figures.gain import LADDER_ERRORS
+from study.figures.kit.declaration import camera_of, declarations, write_figure
+from study.figures.kit.labels import label_curves
 from study.figures.runs import RANKS, Runs, obstacles_of
 from study.pipeline.study import Study
 
@@ -27,6 +29,7 @@ from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, mesh_of, reference
 
 PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending_runs",
             "spring_runs", "strain_runs", "bar_runs", "teaser")  # fmt: skip
+ROWS = ("local_share", "error_budget", "ladder")  # figures whose rows have names
 
 
 def runs(study, name: str, scene: str, frames=(0.3,), ranks=RANKS, **changes) -> Figure:
@@ -56,7 +59,7 @@ def test_every_figure_is_written_without_warnings_and_its_panels_hold_data(
             assert ax.has_data() or ax.texts or ax.images, ax.get_title()
         if figure_name not in PICTURES:
             labels = {label for ax in figure.axes for label in (ax.get_xlabel(), ax.get_ylabel())}
-            assert len(labels - {""}) >= (1 if figure_name == "local_share" else 2)
+            assert len(labels - {""}) >= (1 if figure_name in ROWS else 2)
         unit = {"local_share": "(%)", "accuracy_cost": "(ms)"}.get(figure_name, "")
         assert all(unit in ax.get_xlabel() for ax in figure.axes if ax.get_xlabel())
         figure.draw_without_rendering()
@@ -92,7 +95,7 @@ def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
 
 
 def test_a_run_that_ended_early_lies_on_the_rim(study):
-    """Error against gain: as high as the axis goes, and counted among the runs."""
+    """Error against the constant: as high as the axis goes, and counted among the runs."""
     names = "scene group method r position_basis motion max_extent blowup_frame relative_error"
     runs = [
         ("spring_twist", "spring", method, r, "full", "train", 1.0, ended, error)
@@ -109,7 +112,7 @@ def test_a_run_that_ended_early_lies_on_the_rim(study):
     (dots,) = (each for each in left.lines if len(each.get_xdata()) and each.get_marker() == "D")
     assert (dots.get_ydata() == left.get_ylim()[1]).all()
     assert dots.get_xdata().tolist() == [24.0, 42.0]
-    # gains from ten to a hundred, where all of the two runs failed
+    # constants from ten to a hundred, where all of the two runs failed
     assert [bar.get_height() for bar in right.patches] == [100.0]
     assert [text.get_text() for text in right.texts] == ["2"]
     assert [tick.get_text() for tick in right.get_xticklabels()] == ["$10^{1}$ to $10^{2}$"]
@@ -130,7 +133,7 @@ def test_starts_that_fail_are_counted_below_runs_on_bases_of_round_off(study):
     assert sum("0 of 1 starts fail" in text for text in shown) == 1
     assert sum("1 of 1 starts fail" in text for text in shown) == 1
     labels = [" ".join(text.split()) for text in shown if "noise" in text]
-    assert ["all axes, one vertex across" in label for label in labels] == [True, False]
+    assert ["all axes, plane and one vertex" in label for label in labels] == [True, False]
     assert any("blew up at frame 0" in text for text in shown)
 
 
@@ -173,18 +176,35 @@ def test_figures_are_upright_and_have_the_obstacles_that_the_scene_lists(study):
 
 @pytest.mark.parametrize(
     ("k", "ran", "shown"),
-    [(20, FRAMES, "ecsw, k = 20"), (9, FRAMES, "ecsw, k = 9"), (20, 2, "blew up")],
+    [(20, FRAMES, "error 25 %, 0.5 ms"), (9, FRAMES, "k = 9"), (20, 2, "blew up")],
 )
-def test_the_teaser_shows_a_sampled_subspace_as_far_as_it_ran(small_study, k, ran, shown):
-    study = small_study(["bar_release"], ["pod"])
-    assert not any("ecsw" in text for text in texts(study.draw("teaser", methods=("pod",))))
+def test_the_first_figure_shows_a_test_trajectory_and_a_subspace_as_far_as_it_ran(
+    small_study, monkeypatch, k, ran, shown
+):
+    """The reduced projections are cut off at the frame of the reference, not drawn smaller."""
+    monkeypatch.setattr(pictures, "TEST_FRAMES", 2)
+    study = small_study(["bar_release"], ["gappy"])
+    path = study.path(RERUNS, "bar_release", "deformation_gradient", "gappy")
+    with h5py.File(path, "a") as file:
+        file["heldout/r0014/positions"][...] *= 8.0
+    write_block(Path(path))
+    names = "scene group method position_basis motion k r relative_error_within_horizon"
+    rows = [
+        ("bar_release", "all", "ecsw-1e-02", "pod", "heldout", k, 99, None if ran < 9 else 0.25)
+    ]
+    rows += [("bar_release", "deformation_gradient", "gappy", "full", "heldout", None, 14, 3.5)]
+    table = frame(names, *rows).assign(ms_per_frame=0.5, speedup=4.0)
     points = mesh_of("bar_release").points
     study.study = Study(study.settings | {"subspace": {}}, ROOT)
     with write_hdf5(study.path(SUBSPACES, "bar_release")) as file:
         file[f"columns/pod_k{k:03d}/B"] = np.eye(len(points))
         model = file.create_group(f"models/pod_k{k:03d}_ecsw-1e-02")
-        model["train/coordinates"] = np.repeat(points[None], ran + 1, axis=0)
-    assert any(shown in text for text in texts(study.draw("teaser", methods=("pod",))))
+        model["heldout/coordinates"] = np.repeat(points[None], ran + 1, axis=0)
+    found = texts(study.draw("teaser", {"table": table}, methods=("gappy",)))
+    assert any(shown in text for text in found)
+    assert {"2 ms", "error 350 %, 0.5 ms", "three elements per mode"} <= {*found}
+    assert any("test 1\nframe 12\nr = 14" in text for text in found)
+    assert not any("scale 1 :" in text for text in found)
 
 
 def test_singular_values_below_round_off_are_hollow(study):
@@ -210,27 +230,67 @@ def test_errors_above_the_axis_are_marked_on_its_rim(study):
 def test_the_horizon_is_the_first_frame_above_the_threshold(study):
     figure = study.draw("sensitivity_floor", scenes=("spring_twist", "strain_oop"))
     # 10^(-9 + f/2) exceeds 1e-3 first at f = 13
-    assert "spring twist: 13" in texts(figure)
-    assert "strain oop: beyond 20" in texts(figure)
+    assert "twisted sheet, springs: horizon 13" in texts(figure)
+    assert "hanging sheet, strain: no horizon" in texts(figure)
+    solid, dotted = figure.axes[0].lines[1:3]
+    assert [len(solid.get_xdata()), dotted.get_xdata()[0]] == [14, 13]
 
 
-def test_full_order_runs_with_any_number_of_iterations_are_the_crosses_of_one_curve(study):
-    """The scene's own number of iterations is a line, accelerated runs are not drawn."""
-    names = "scene method position_basis iterations relative_error_within_horizon ms_per_frame"
-    points = [("full", 10, 0.01, 4.0), ("deim", 10, 0.5, 2.0), ("fom-anderson", 10, 0.005, 4.5)]
-    points += [("fom", k, 1.0 / k, 0.4 * k) for k in (2, 10, 40)]
-    points += [("coarser-mesh", 2, 0.04, 0.1), ("coarser-mesh-anderson", 5, 0.03, 0.3)]
-    table = frame(names, *(("strain_oop", method, "full", *rest) for method, *rest in points))
+def test_error_against_time_has_a_labelled_curve_for_each_kind_of_model(study):
+    """Coarser meshes and subspaces are the best settings; other models are left out."""
+    names = "scene method position_basis relative_error_within_horizon ms_per_frame"
+    points = [("full", "full", 0.01, 4.0), ("fom-anderson", "full", 0.005, 4.5)]
+    points += [("fom", "full", 1.0 / k, 0.4 * k) for k in (10, 2, 40)]
+    points += [("coarser-mesh", "full", 0.04, 0.1), ("coarser-mesh-anderson", "full", 0.03, 0.3)]
+    points += [("coarser-mesh", "full", 0.5, 0.2), ("ecsw-1e-02", "pod", 1e5, 0.2)]
+    points += [("gappy", "full", np.inf, 1.0), ("gappy", "full", 0.2, 2.0), ("deim", "full", 1, 1)]
+    table = frame(names, *(("strain_oop", *point) for point in points))
     table["mesh_error"] = np.where(table.method == "full", 0.02, np.nan)
     figure = study.draw("accuracy_cost", {"table": table}, scenes=("strain_oop",))
     (ax,) = figure.axes
-    assert any(list(line.get_xdata()) == [4.0, 4.0] for line in ax.lines)
-    assert 4.5 not in {float(x) for line in ax.lines for x in line.get_xdata()}
-    (runs,) = (line for line in ax.lines if line.get_marker() == "X")
-    assert list(runs.get_xdata()) == pytest.approx([0.8, 4.0, 16.0])
-    *_, front, _ = [line for line in ax.lines if line.get_color() == view.FAMILIES[view.COARSE]]
-    assert front.get_xydata().tolist() == [[0.1, 0.04], [0.3, 0.03]]
-    assert any(list(line.get_ydata()) == [0.02, 0.02] for line in ax.lines)
+    labels = [text.get_text() for text in ax.texts]
+    assert labels == [view.CURVES[name] for name in ("fom", "coarser-mesh", "gappy", "ecsw")]
+    *curves, mesh = [line.get_xydata().tolist() for line in ax.lines]
+    assert curves[0] == pytest.approx(np.array([[0.8, 0.5], [4.0, 0.1], [16.0, 0.025]]))
+    assert curves[1:] == [[[0.1, 0.04], [0.3, 0.03]], [[2.0, 0.2]], [[0.2, view.HIGH]]]
+    assert [y for _, y in mesh] == [0.02, 0.02]
+
+
+def test_labels_of_curves_stand_beside_their_curve_and_clear_of_others(study):
+    ax = Figure().subplots()
+    ax.set(xlim=(0, 1), ylim=(0, 1))
+    up, down = np.array([[0.1, 0.1], [0.8, 0.8]]), np.array([[0.1, 0.9], [0.8, 0.2]])
+    label_curves(ax, [("up", "k", up), ("", "k", up), ("down", "k", down)], (4.0, 3.0))
+    first, second = ax.texts
+    assert [first.xy.tolist() in up.tolist(), second.xy.tolist() in down.tolist()] == [True, True]
+    assert {*map(tuple, (first.xyann, second.xyann))} != {(0.0, 0.0)}
+
+
+def test_the_ablation_has_a_line_for_each_scene_and_constants_of_two(study):
+    """A study with other steps has those of its list; a blown-up run is on the limit."""
+    names = "scene direction rung gain relative_error_within_horizon error_low error_high"
+    rows = [("spring_twist", "up", "published code", 1234.0, None, None, None)]
+    rows += [("spring_twist", "down", "and a gain of at most 2", 2.0, 0.01, 0.005, 0.02)]
+    rows += [("spring_twist", "up", "my step", 50.0, 0.5, None, None)]
+    for table, steps in ((frame(names, *rows), 2), (frame(names, rows[2]), 1)):
+        (ax,) = study.draw("ladder", {"table": table}, scenes=("spring_twist",)).axes
+        assert len(ax.lines[0].get_xdata()) == steps
+    (ax,) = study.draw("ladder", {"table": frame(names, *rows)}, scenes=("spring_twist",)).axes
+    assert ax.lines[0].get_xdata().tolist() == [LADDER_ERRORS[1], 0.01]
+    assert [text.get_text() for text in ax.texts] == ["1,234", "2.0", "DEIM constants"]
+
+
+def test_the_error_budget_has_medians_of_test_trajectories(study):
+    names = "scene motion skinning part deformation_error"
+    rows = [
+        ("strain_oop", motion, 0, part, scale * error)
+        for motion, scale in (("heldout", 1.0), ("kick", 2.0), ("stiffness", 9.0))
+        for part, error in (("span", 1e-9), ("closure", 0.1), ("full_order", 0.2))
+    ]
+    table = frame(names, *rows, ("strain_oop", "kick", 40, "run", 1.0))
+    (ax,) = study.draw("error_budget", {"table": table}, scenes=("strain_oop",)).axes
+    found = {line.get_marker(): line.get_xdata()[0] for line in ax.lines[1:]}
+    assert found == pytest.approx({"None": 1e-3, "|": 1e-3, "o": 0.2, "x": 0.4})
 
 
 def test_coarser_meshes_have_a_curve_and_the_own_mesh_an_error():
@@ -247,8 +307,11 @@ def test_coarser_meshes_have_a_curve_and_the_own_mesh_an_error():
     assert curves[view.MESH_ERROR["color"]] == [[0.0, 0.05], [1.0, 0.05]]
 
 
-def test_a_speedup_that_is_doubtful_has_another_mark():
-    """Hollow: a large error, or a lower bound (arrow); a cross without a number: not judged."""
+def test_a_speedup_that_is_doubtful_has_another_mark(study):
+    """Hollow: a large error; an arrow: a lower bound; a cross: not judged; errors of large meshes.
+
+    Of the reduced models the one with five iterations and most training trajectories is drawn.
+    """
     names = "vertices motion position_error known same_reached"
     rows = [(8000, "heldout", 0.0035, True, True), (400, "heldout", 9.0, False, True)]
     rows += [(400, "kick", 0.2, True, True), (400, "stiffness", 0.011, True, False)]
@@ -256,47 +319,11 @@ def test_a_speedup_that_is_doubtful_has_another_mark():
     table = table.assign(method="ecsw", training_motions=2, iterations=5, coarser_reached=True)
     of = [f"{name}_speedup" for name in ("same", "coarser")]
     table[[*of, *(f"{name}_{end}" for name in of for end in ("low", "high"))]] = 4.0
+    table = pd.concat([table, table.assign(training_motions=1), table.assign(iterations=np.nan)])
     same, coarser = declarations()["equal_error"].draw(table=table.assign(recorded=None)).axes
     marks = [line for line in same.lines if len(line.get_xdata()) == 1]
-    marks = sorted((line.get_xdata()[0], line.get_marker(), line.get_mfc()) for line in marks)
-    assert [marker for _, marker, _ in marks] == ["x", "o", "o", "o"]
-    assert [face == "white" for *_, face in marks] == [False, True, True, False]
-    assert sorted(text.get_text() for text in same.texts) == ["0.35", "1.1", "20", "\u2191"]
-    assert len(coarser.texts) == 3
-    assert [t.get_text() for t in same.get_xticklabels()] == ["a, 400", "a, 8,000"]
-
-
-def test_every_method_has_a_family():
-    methods = load_methods(CONFIG / "methods.yaml")
-    reductions = {m: Reduction(title=spec.title, rows=spec.rows) for m, spec in methods.items()}
-    everything = Drawn(experiments=(), reductions=reductions)
-    families = {name: view.look_of(name, "full", everything)[0] for name in everything.methods}
-    assert set(families.values()) <= {*view.FAMILIES} - {view.ITERATIONS}
-    assert view.look_of("ecsw-1e-02", "pod", everything)[0] == view.WEIGHTED
-
-
-def invented(errors, times, blown_up=()):
-    """Points of one scene, of one method that samples single entries."""
-    names = {"scene": "a", "method": "deim", "position_basis": "full", "number": 0, "marker": "o"}
-    names |= {"family": view.ENTRIES, "member": "deim"}
-    points = pd.DataFrame({view.ERROR: errors, view.TIME: times})
-    lost = pd.DataFrame({view.ERROR: np.nan, view.TIME: blown_up})
-    own = pd.DataFrame({view.TIME: [2.0], "mesh_error": [0.1]}, index=["a"])
-    return view.TradeOffs(points.assign(**names), lost.assign(**names), own)
-
-
-def drawn(ax, marker):
-    lines = [line for line in ax.lines if line.get_marker() == marker]
-    return [tuple(map(float, xy)) for line in lines for xy in line.get_xydata()]
-
-
-def test_points_outside_the_axis_are_arrows_on_its_rim():
-    ax = Figure().subplots()
-    view.draw_panel(ax, invented([1e-9, 0.1, 1e5], [1.0, 2.0, 3.0], blown_up=[4.0]), "a")
-    assert drawn(ax, view.BELOW) == [(1.0, view.LOW)]
-    assert drawn(ax, view.ABOVE) == [(3.0, view.HIGH)]
-    assert drawn(ax, "o") == [(2.0, 0.1)]
-    ((time, height),) = drawn(ax, view.BLOWN_UP)
-    assert time == 4.0
-    assert view.LOW < height < view.HIGH
-    assert ax.get_xlim()[1] > 4.0
+    found = [(line.get_marker(), line.get_mfc() == "white") for line in marks]
+    assert found == [("x", False), ("^", True), ("^", False), (6, False), ("^", False)]
+    assert all(a.get_xdata()[0] <= b.get_xdata()[0] for a, b in pairwise(marks))
+    assert [len(axes.lines) - len(marks) for axes in (same, coarser)] == [4, 3]
+    assert [text.get_text() for text in same.texts] == ["a: 0.35 %"]

@@ -106,4 +106,9 @@ def test_runs_are_read_only_where_finite(study):
     assert entry == BLOWUP_FRAME - 1
     assert np.isfinite(positions).all()
     assert [i.r for i in choose_ranks(list(infos.values()), ("full", 14, 6, 99))] == [14, 6]
+    test = next(info for info in rerun_infos(path, "heldout") if info.r == 6)
+    shown, same = (info.at(11) for info in (test, infos[6]))
+    assert shown[0] == 8
+    np.testing.assert_array_equal(shown[1], infos[6].at(8)[1])
+    assert same[0] == 11
     assert choose_ranks(list(infos.values()), (99,)) == list(infos.values())
