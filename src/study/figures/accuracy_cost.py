@@ -23,10 +23,10 @@ SAMPLED = "ecsw"
 CURVES = {
     FOM: "fewer or more iterations",
     COARSER: "coarser mesh",
-    "published": words.method("published"),
-    "block-deim": words.method("block-deim"),
-    "gappy": words.method("gappy"),
     SAMPLED: words.method(SAMPLED),
+    "published": words.method("published"),
+    "gappy": words.method("gappy"),
+    "block-deim": words.method("block-deim"),
 }
 HEIGHT = 2.3  # of the figure, inches
 
@@ -83,12 +83,12 @@ def accuracy_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
 
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits
 BESIDE = 4  # largest number of panels in a row
-BEST = {"full-order model": style.BLACK, "full-order model, coarser meshes": style.ORANGE}
+BEST = {"full-order model": style.BLACK, "the same on coarser meshes": style.ORANGE}
 DOT = (0.55, 0.55, 0.55)
 # Legend label -> (condition on the number of training trajectories of a reduction, colour).
 TRAINED = {
-    "reduced model, one training trajectory": ("training_motions == 1", "#7FCFB4"),
-    "reduced model, several trajectories": ("training_motions > 1", style.GREEN),
+    "reduced, one training trajectory": ("training_motions == 1", "#7FCFB4"),
+    "reduced, several trajectories": ("training_motions > 1", style.GREEN),
 }
 BARE = "without the time of the vertices"
 
@@ -122,7 +122,7 @@ def alternatives(table: pd.DataFrame) -> Figure:
     label_outer(axes, beside, "time / plain frame", y="position error")
     drawn = BEST | {label: colour for label, (_, colour) in TRAINED.items()}
     lines = [style.handle(BARE, color=style.GREEN, linestyle=":")]
-    lines.append(style.handle("replaying the training trajectory", color="#555555", linestyle="--"))
+    lines.append(style.handle("replaying the training", color="#555555", linestyle="--"))
     lines.append(style.handle("error of the mesh itself", **MESH_ERROR))
     looks = {label: (colour, "o") for label, colour in drawn.items()}
     style.legend(figure, [*style.handles(looks), *lines], 3)

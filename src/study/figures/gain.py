@@ -97,7 +97,7 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     ax.set(ylim=(0, 112), yticks=[0, 25, 50, 75, 100])
     ax.tick_params(axis="x", labelrotation=35)
     ax.set(xlabel="DEIM constant", ylabel="failing simulations (%)")
-    ax.set_title("number of simulations above each bar")
+    ax.set_title("numbers: simulations")
     ax.grid(True)
 
 
@@ -183,7 +183,7 @@ def _panels(
     figure, axes = small_multiples(len(shown), columns, legend_rows=legend)
     for ax, each in zip(axes, shown, strict=True):
         style.log_axis(ax, *limits)
-        ax.set_title(each.title)
+        ax.set_title(each.title.replace(": ", ":\n"))
     found = [rows[each.scene, each.group] for each in shown]
     return figure, list(zip(axes, shown, found, strict=True))
 
@@ -287,7 +287,7 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
     if reference:
         label = "preprint's code (x, y)"
         handles.append(style.handle(label, color=PUBLISHED, linewidth=1.0))
-    style.legend(figure, handles, 4)
+    style.legend(figure, handles, 3)
     return figure
 
 

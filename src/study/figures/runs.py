@@ -378,8 +378,9 @@ def _with_numbers(panel: RunPanel, title: str, rows: pd.DataFrame) -> RunPanel:
     error = rows.relative_error_within_horizon[rows.motion == FIRST].dropna()
     look = {"precision": 2, "fractional": False, "trim": "-"}
     texts = [f"error {np.format_float_positional(100.0 * e, **look)} %" for e in error[:1]]
+    texts = texts or [text for text in (panel.failure or panel.remark,) if text]
     texts += [f"{value:.2g} ms" for value in rows.ms_per_frame.dropna()[:1]]
-    return replace(panel, title=title, failure=None, remark=", ".join(texts) or panel.remark)
+    return replace(panel, title=title, failure=None, remark=", ".join(texts))
 
 
 def _subspace(frame: int, path: str) -> tuple[int, np.ndarray | None]:

@@ -11,33 +11,39 @@ FONT = 7.5  # points
 CHARACTER, HEIGHT, OFFSET = 0.057, 0.115, 0.07  # inches: mean width, height, distance of a label
 SIDES = {-1: ("right", "top"), 0: ("center", "center"), 1: ("left", "bottom")}
 # Offsets of a label in units of `OFFSET`: to the right and up.
-PLACES = [(1, 0), *product(SIDES, (1, -1)), (-1, 0), *product(SIDES, (2.2, -2.2))]
+OFFSETS = [(1, 0), *product(SIDES, (1, -1)), (-1, 0), *product(SIDES, (2.2, -2.2))]
+PASSES = 3
 Curve = tuple[str, str, np.ndarray]  # label, colour, points (n, 2) in data coordinates
+Place = tuple[float, int, int, np.ndarray]  # cost, number of the point, of the offset, and box
 
 
 def label_curves(ax: Axes, curves: Sequence[Curve], size: tuple[float, float]) -> None:
     """Write the label of each curve beside one of its points, in its colour.
 
     The places that are tried are those around all points of the curve; that with the least ink and
-    text in its way is taken. ``size`` is the approximate width and height of ``ax`` in inches. The
-    limits of ``ax`` must have been set. A curve without a label is only in the way.
+    text in its way is taken, and each label is placed again when the others have their places. The
+    approximate ``size`` of ``ax`` is in inches; its limits must have been set. A curve without a
+    label is only in the way.
     """
     scaled = [_inches(ax, points, size) for *_, points in curves]
-    ink, taken = np.concatenate([_dense(points) for points in scaled]), list[np.ndarray]()
-    for (label, colour, points), own in zip(curves, scaled, strict=True):
-        tried = []
-        for at in np.flatnonzero(np.isfinite(own).all(axis=1)) if label else ():
-            for preference, offset in enumerate(PLACES):
-                box = _box(own[at], label, offset)
-                tried.append((_cost(box, size, ink, taken) + 0.1 * preference, at, offset, box))
-        if tried:
-            _, at, offset, box = min(tried, key=lambda each: each[0])
-            taken.append(box)
-            sides = [SIDES[int(np.sign(way))][axis] for axis, way in enumerate(offset)]
-            ax.annotate(
-                label, points[at], 72.0 * OFFSET * np.array(offset), textcoords="offset points",
-                ha=sides[0], va=sides[1], color=colour, fontsize=FONT, zorder=6,
-            )  # fmt: skip
+    ink, places = np.concatenate([_dense(points) for points in scaled]), dict[int, Place]()
+    named = [i for i, (label, *_) in enumerate(curves) if label]
+    for i in named * PASSES:
+        taken = [box for k, (*_, box) in places.items() if k != i]
+        tried = [
+            (_cost(box, size, ink, taken) + 0.02 * preference**2, at, preference, box)
+            for at in np.flatnonzero(np.isfinite(scaled[i]).all(axis=1))
+            for preference, offset in enumerate(OFFSETS)
+            for box in [_box(scaled[i][at], curves[i][0], offset)]
+        ]
+        places |= {i: min(tried, key=lambda each: each[0])} if tried else {}
+    for i, (_, at, preference, _) in places.items():
+        (label, colour, points), offset = curves[i], OFFSETS[preference]
+        sides = [SIDES[int(np.sign(way))][axis] for axis, way in enumerate(offset)]
+        ax.annotate(
+            label, points[at], 72.0 * OFFSET * np.array(offset), textcoords="offset points",
+            ha=sides[0], va=sides[1], color=colour, fontsize=FONT, zorder=6,
+        )  # fmt: skip
 
 
 def _inches(ax: Axes, points: np.ndarray, size: tuple[float, float]) -> np.ndarray:

@@ -132,8 +132,9 @@ def _write_bases(results, scene, group, count, rank, rng) -> Basis:
 def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
     with write_hdf5(results.path(paths.RERUNS, scene, group, method)) as file:
         for r in (6, 10, 14, 20):
-            store = file.create_group(f"r{r:04d}")
-            store.attrs.update(r=r, full=r == rank, marked=r > rank)
+            store, test = (file.create_group(f"{run}r{r:04d}") for run in ("", "heldout/"))
+            for own, every in ((store, 1), (test, 4)):
+                own.attrs.update(r=r, full=r == rank, marked=r > rank, every=every)
             if r > rank:
                 continue
             failed = (scene, method, r) == BLOWN_UP
@@ -142,9 +143,9 @@ def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
             if failed:
                 moved[-1] = np.nan
             blowup = BLOWUP_FRAME if failed else -1
-            for own, every in ((store, 1), (file.create_group(f"heldout/r{r:04d}"), 4)):
-                own["positions"] = moved[::every].astype(np.float32)
-                own.attrs.update(store.attrs, blowup_frame=blowup, every=every)
+            for own in (store, test):
+                own["positions"] = moved[:: own.attrs["every"]].astype(np.float32)
+                own.attrs.update(blowup_frame=blowup)
 
 
 def reference(name: str) -> pd.DataFrame:
