@@ -20,7 +20,7 @@ SCENES = {
     "sheet100_strain": "hanging sheet, strain", "sheet200_strain": "hanging sheet, strain",
 }  # fmt: skip
 METHODS = {
-    "full": "full-order model", "published": "preprint's code",
+    "fom": "full-order model", "published": "preprint's code",
     "deim-joint": "preprint's selection", "deim": "entry-wise DEIM", "qdeim": "entry-wise Q-DEIM",
     "s-opt": "entry-wise S-OPT", "block-deim": "element-wise DEIM",
     "block-qdeim": "element-wise Q-DEIM", "block-s-opt": "element-wise S-OPT",

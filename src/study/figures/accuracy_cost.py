@@ -68,7 +68,7 @@ def accuracy_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
     figure = style.new_figure(HEIGHT)
     ax = figure.subplots()
     for name, rows in found.items():
-        colour, marker = METHODS["full" if name == FOM else name]
+        colour, marker = METHODS[name]
         points = np.stack([rows[TIME], rows[ERROR].clip(LOW, HIGH)], axis=1)
         ax.plot(*points.T, color=colour, marker=marker, markersize=4.5, linewidth=1.3)
         labelled.append((CURVES[name], colour, points))

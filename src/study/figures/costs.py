@@ -8,15 +8,7 @@ from pdrom.view.artists import Artist, Axes, Figure
 from study.artifact import words
 from study.artifact.reads import TableOf
 from study.experiments.kit.base import REST
-from study.figures.kit.declaration import (
-    GROUPS,
-    MESHES,
-    METHODS,
-    Drawn,
-    figure,
-    held,
-    method_styles,
-)
+from study.figures.kit.declaration import GROUPS, MESHES, Drawn, figure, held, method_styles
 from study.figures.kit.multiples import label_outer, label_rows, plain_ticks, small_multiples
 
 # Phases of a frame: (label, colour). The first two form the local step, whose share is printed.
@@ -34,8 +26,8 @@ CURVES = {
     "global_ms": ("global solve", ":"),
     "vertices_ms": ("positions of all vertices", "-."),
 }
-# Method -> legend entry; beside its curve stands p of the fit time ~ (number of vertices)^p.
-NAMES = {"fom": words.method("full"), "ecsw": words.method("ecsw")}
+# Methods beside whose curves stands p of the fit time ~ (number of vertices)^p.
+FITTED = ("fom", "ecsw")
 ROOM = 2.6  # the axis ends at this multiple of the largest mesh size, to leave space for text
 COLUMNS = 3  # panels in a row of figure `break_even`
 
@@ -99,7 +91,7 @@ def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
     power law, where there are three mesh sizes or more.
     """
     scenes = drawn.scenes_of(table)
-    figure, looks = style.new_figure(2.9), method_styles({*table.method}) | {"fom": METHODS["full"]}
+    figure, looks = style.new_figure(2.9), method_styles({*table.method})
     times = figure.subplots(1, len(scenes), sharex=True, sharey=True, squeeze=False)[0]
     for ax, scene in zip(times, scenes, strict=True):
         rows = table[table.scene == scene].sort_values("vertices")
@@ -111,7 +103,7 @@ def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
         low, high = np.log10(axis.get_view_interval())
         plain_ticks(axis, high - low)
     times[0].set_ylabel("time of an iteration (ms)")
-    named = {NAMES.get(m) or drawn.title(m): looks[m] for m in dict.fromkeys(table.method)}
+    named = {drawn.title(m): looks[m] for m in dict.fromkeys(table.method)}
     lines = [style.handle(label, color="#555555", linestyle=s) for label, s in CURVES.values()]
     style.legend(figure, [*style.handles(named), *lines], 4)
     return figure
@@ -127,7 +119,7 @@ def _draw_times(ax: Axes, rows: pd.DataFrame, looks: dict[str, tuple[str, str]])
             time = part[quantity].where(part[quantity] > 0.0)
             ax.plot(part.vertices, time, line, color=colour, **look)
         end = part.iloc[-1]
-        if method in NAMES and end.exponent == end.exponent:
+        if method in FITTED and end.exponent == end.exponent:
             at, look = (end.vertices, end.ms_per_iteration), {"va": "center", "fontsize": 7.5}
             power = rf"$N^{{{end.exponent:.2f}}}$"
             ax.annotate(power, at, (5, 0), textcoords="offset points", color=colour, **look)

@@ -1,5 +1,6 @@
 """Figures that show reduced runs beside full-order runs, for the scenes of the preprint."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -345,28 +346,24 @@ def _teaser_row(
     looks = METHODS | drawn.looks
     colours = {name: style.surface_colour(colour) for name, (colour, _) in looks.items()}
     table = table[(table.scene == experiment.scene) & table.group.isin([experiment.group, "all"])]
-    panels, sizes = list[RunPanel](), dict[str, int]()
+    time = _milliseconds(table.ms_per_frame * table.speedup)
+    panels = [RunPanel(words.method("fom"), style.FULL_ORDER, full[0], None, time, reference=True)]
+    sizes = dict[str, int]()
     for method in drawn.methods:
         infos = rerun_infos(experiment.find(files["reruns"], method=method), FIRST)
         for info in [info for info in choose_ranks(infos, (MODES,)) if not info.marked][-1:]:
-            rows = table[(table.method == method) & (table.r == info.r)]
+            sizes["r"] = info.r
+            rows = table[(table.method == method) & (table.r == info.r) & (table.group != "all")]
             shown = info.panel(frame, colours[method])
             panels.append(_with_numbers(shown, drawn.title(method), rows))
-            sizes["r"] = info.r
-    if path := experiment.find(files["subspaces"]):
-        sizes["k"], positions = _subspace(frame, path)
+    path = experiment.find(files["subspaces"])
+    for sizes["k"], positions in _subspace(frame, path) if path else ():
         rows = table[(table.method == TOLERANCE) & (table.k == sizes["k"])]
-        shown = RunPanel(
-            "", colours["ecsw"], positions, None if positions is not None else "blew up"
-        )
-        title = words.method(TOLERANCE).partition(" (")[0]
-        panels.append(_with_numbers(shown, title, rows))
-    time = (table.ms_per_frame * table.speedup).median()
-    first = RunPanel(words.method("full"), style.FULL_ORDER, full[0], reference=True)
-    first = replace(first, remark=f"{time:.2g} ms")
+        shown = RunPanel("", colours["ecsw"], positions, remark="blew up")
+        panels.append(_with_numbers(shown, words.method(TOLERANCE).partition(" (")[0], rows))
     camera, bodies = camera_of(experiment), obstacles_of(experiment, full)
     window = view.shared_window(camera, full[0], panels)
-    panels = [replace(panel, obstacles=bodies, cropped=True) for panel in (first, *panels)]
+    panels = [replace(panel, obstacles=bodies, cropped=True) for panel in panels]
     size = ", ".join(f"{name} = {number}" for name, number in sizes.items())
     label = f"{experiment.title}\n{words.TRAJECTORIES[FIRST]}\nframe {frame}\n{size}"
     ghosts, windows = np.repeat(full, len(panels), axis=0), [window] * len(panels)
@@ -379,19 +376,25 @@ def _with_numbers(panel: RunPanel, title: str, rows: pd.DataFrame) -> RunPanel:
     look = {"precision": 2, "fractional": False, "trim": "-"}
     texts = [f"error {np.format_float_positional(100.0 * e, **look)} %" for e in error[:1]]
     texts = texts or [text for text in (panel.failure or panel.remark,) if text]
-    texts += [f"{value:.2g} ms" for value in rows.ms_per_frame.dropna()[:1]]
+    texts += [text for text in [_milliseconds(rows.ms_per_frame)] if text]
     return replace(panel, title=title, failure=None, remark=", ".join(texts))
 
 
-def _subspace(frame: int, path: str) -> tuple[int, np.ndarray | None]:
-    """Number of modes of the largest position subspace up to `MODES`, and its positions (N, 3) m.
+def _milliseconds(times: pd.Series) -> str | None:
+    """Median of ``times`` in ms with its unit; None if all are missing."""
+    return f"{times.median():.2g} ms" if times.notna().any() else None
 
-    The positions are None if the run on the test trajectory ended before ``frame``.
+
+def _subspace(frame: int, path: str) -> Iterator[tuple[int, np.ndarray | None]]:
+    """Yield the number of modes of the largest position subspace up to `MODES`, and positions.
+
+    The positions (N, 3) m are None if the run on the test trajectory ended before ``frame``.
+    Nothing is yielded without such a subspace.
     """
     with open_hdf5(path) as file:
         models = file["models"]
-        k = next(k for k in range(MODES, 0, -1) if f"pod_k{k:03d}_{TOLERANCE}" in models)
-        stored = models[f"pod_k{k:03d}_{TOLERANCE}"][FIRST]["coordinates"]
-        if len(stored) <= frame:
-            return k, None
-        return k, file["columns"][f"pod_k{k:03d}"]["B"][...] @ stored[frame]
+        found = [k for k in range(MODES, 0, -1) if f"pod_k{k:03d}_{TOLERANCE}" in models]
+        for k in found[:1]:
+            stored = models[f"pod_k{k:03d}_{TOLERANCE}"][FIRST]["coordinates"]
+            base = file["columns"][f"pod_k{k:03d}"]["B"]
+            yield k, base[...] @ stored[frame] if len(stored) > frame else None

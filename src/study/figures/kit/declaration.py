@@ -42,7 +42,7 @@ from study.tables.effects_cost import unreliable
 MESHES = "disc_strain ball_shell torus_release starfish_twist"  # scenes of config/extended.yaml
 # Method, or mesh of the full-order model -> colour and marker.
 METHODS: dict[str, tuple[str, str]] = {
-    "full": (style.BLACK, "o"),
+    "fom": (style.BLACK, "o"),
     "coarser-mesh": (style.ORANGE, "H"),
     "published": (style.VERMILLION, "v"),
     "deim-joint": ("#7A5C00", "D"),

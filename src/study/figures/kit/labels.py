@@ -31,7 +31,7 @@ def label_curves(ax: Axes, curves: Sequence[Curve], size: tuple[float, float]) -
     for i in named * PASSES:
         taken = [box for k, (*_, box) in places.items() if k != i]
         tried = [
-            (_cost(box, size, ink, taken) + 0.02 * preference**2, at, preference, box)
+            (_cost(box, size, ink, taken) + 0.02 * preference**2, int(at), preference, box)
             for at in np.flatnonzero(np.isfinite(scaled[i]).all(axis=1))
             for preference, offset in enumerate(OFFSETS)
             for box in [_box(scaled[i][at], curves[i][0], offset)]
