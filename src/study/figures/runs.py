@@ -351,7 +351,8 @@ def _teaser_row(
     sizes = dict[str, int]()
     for method in drawn.methods:
         infos = rerun_infos(experiment.find(files["reruns"], method=method), FIRST)
-        for info in [info for info in choose_ranks(infos, (MODES,)) if not info.marked][-1:]:
+        ran = [info for info in infos if not info.marked]
+        for info in choose_ranks(ran, (MODES,))[-1:]:
             sizes["r"] = info.r
             rows = table[(table.method == method) & (table.r == info.r) & (table.group != "all")]
             shown = info.panel(frame, colours[method])

@@ -249,10 +249,10 @@ def test_error_against_time_has_a_labelled_curve_for_each_kind_of_model(study):
     figure = study.draw("accuracy_cost", {"table": table}, scenes=("strain_oop",))
     (ax,) = figure.axes
     labels = [text.get_text() for text in ax.texts]
-    assert labels == [view.CURVES[name] for name in ("fom", "coarser-mesh", "gappy", "ecsw")]
+    assert labels == [view.CURVES[name] for name in ("fom", "coarser-mesh", "ecsw", "gappy")]
     *curves, mesh = [line.get_xydata().tolist() for line in ax.lines]
     assert curves[0] == pytest.approx(np.array([[0.8, 0.5], [4.0, 0.1], [16.0, 0.025]]))
-    assert curves[1:] == [[[0.1, 0.04], [0.3, 0.03]], [[2.0, 0.2]], [[0.2, view.HIGH]]]
+    assert curves[1:] == [[[0.1, 0.04], [0.3, 0.03]], [[0.2, view.HIGH]], [[2.0, 0.2]]]
     assert [y for _, y in mesh] == [0.02, 0.02]
 
 
