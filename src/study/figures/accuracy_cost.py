@@ -55,12 +55,11 @@ def curves(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
 def accuracy_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Interpolated projections are accurate with enough samples, but reduced positions, fewer
     iterations and coarser meshes reach most errors in less time. Position error on the training
-    trajectory, before the horizon and against the converged step, and time per frame, in one scene.
-    Marks are basis sizes $r$ (interpolated projections), numbers of iterations $K$ (full-order
-    model), and the best combinations of the number of modes and the tolerance (reduced positions)
-    or of mesh, iterations and acceleration (coarser mesh). The dash-dotted line, where it is known,
-    is the error of the mesh itself by Richardson's rule. Further down and further left is better;
-    errors outside the axis are drawn on its limits.
+    trajectory, before the horizon and against the converged step, and time per frame. Marks are
+    basis sizes $r$ (interpolated projections), numbers of iterations $K$ (full-order model), and
+    the best combinations of modes and tolerance (reduced positions) or of mesh, iterations and
+    acceleration (coarser mesh). Dash-dotted, where it is known: the error of the mesh itself.
+    Further down and further left is better; errors outside the axis are drawn on its limits.
     """
     scene = drawn.scenes_of(held(table.dropna(subset=[ERROR, TIME])))[0]
     table = table[table.scene == scene]
@@ -98,17 +97,15 @@ BARE = "without the time of the vertices"
     timed=True,
 )  # fmt: skip
 def alternatives(table: pd.DataFrame) -> Figure:
-    r"""On most meshes one of the full-order settings or a coarser mesh reaches the error of the
-    reduced models in less time. Position error over all frames of the first test trajectory,
-    against the converged step of the same mesh, and time per frame with the positions of all
-    vertices, divided by the time of ten plain local/global iterations. Black: the best full-order
-    settings (all others are the grey dots); orange: the best settings on coarser meshes, whose
-    displacement is interpolated to all vertices. Green: the reduced model (ECSW), pale with one
-    training trajectory, dark with several; dotted: without the time of the vertices. Dashed: the
-    error of replaying the training trajectory. Dash-dotted: the error of the mesh itself, by
-    Richardson's rule on three meshes, where the observed order is .5 to 3; a smaller error of a
-    solver has no value. $\times 100$: weights a hundred times as large; *: some rows were recorded
-    earlier or on another machine. Errors outside the axis are drawn on its limits.
+    r"""On most meshes a full-order setting or a coarser mesh reaches the error of the reduced
+    models in less time. Position error over all frames of the first test trajectory, against the
+    converged step of the same mesh, and time per frame with the positions of all vertices, divided
+    by that of ten plain local/global iterations. Black: the best full-order settings (others: grey
+    dots); orange: on coarser meshes, whose displacement is interpolated. Green: the reduced model
+    (ECSW); dotted: without the time of the vertices. Dashed: replaying the training trajectory.
+    Dash-dotted: the error of the mesh itself, by Richardson's rule, where the observed order is .5
+    to 3. $\times 100$: weights a hundred times as large; *: some rows were recorded earlier or on
+    another machine. Errors outside the axis are drawn on its limits.
     """
     table = table[table.motion == FIRST]
     cases = table.groupby(["scene", "factor", "stiffness"])

@@ -85,9 +85,8 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
 )  # fmt: skip
 def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """The time of a full-order iteration grows with the mesh, that of the reduced model hardly.
-    Time of one local/global iteration against the number of vertices: full-order model, the same
-    with reduced projections only, and reduced positions with sampled elements; the time of the
-    positions of all vertices is a separate line. Beside the curves stands the exponent of a fitted
+    Time of one local/global iteration against the number of vertices, and of its parts; the
+    positions of all vertices are a separate line. Beside the curves stands the exponent of a fitted
     power law, where there are three mesh sizes or more.
     """
     scenes = drawn.scenes_of(table)

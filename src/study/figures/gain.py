@@ -35,10 +35,9 @@ _KEYS = ["scene", "group", "method", "r"]
 def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
     """Most simulations with a large DEIM constant fail, and few with a small one. Left: every
     simulation by a sampled method whose basis suffices (the orthogonal projection of the same size
-    does not fail), over all scenes and sizes. The dashed line is the error from which on a
-    simulation counts as failed; arrows lie outside the axes. Crosses are ranges and medians over
-    simulations, in some scenes, that are trained on as many resampled frames. Right: share of
-    failing simulations by decade of the constant.
+    does not fail). Above the dashed line a simulation counts as failed; arrows lie outside the
+    axes. Crosses are ranges and medians over simulations that are trained on as many resampled
+    frames. Right: share of failing simulations by decade of the constant.
     """
     runs = drawn.rows(judged_runs(tables["reruns"], tables["errors"]))
     figure = style.new_figure(3.0)
@@ -161,10 +160,7 @@ def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
 VALUES = (1e-17, 3.0)
 SHOWN = (1e-7, 1e3)  # limits of the error axis; errors outside are drawn on the limits
 # Set of snapshots -> legend entry and line style.
-SPLITS = {
-    "train": ("training frames", "-"), "test": ("frames between them", "--"),
-    "heldout": ("test 1", ":"),
-}  # fmt: skip
+SPLITS = {"train": ("training", "-"), "test": ("frames between", "--"), "heldout": ("test 1", ":")}
 PUBLISHED = "#B5B5B5"
 PUBLISHED_CODE = "config/reference/published_code"
 # Scene -> similar experiment of the published code, which is drawn beside it.

@@ -319,17 +319,15 @@ def _colours() -> ScalarMappable:
         "meshes": RUNS["meshes"], "full_order": EachOf(HELDOUT, "drawn.experiments"),
         "reruns": RUNS["reruns"], "subspaces": EachOf(SUBSPACES, "drawn_subspaces"),
         "table": TableOf("reduced_reruns"),
-    }, scenes="bar_release spring_oop", methods="published gappy",
-    timed=True,
+    }, scenes="bar_release spring_oop", methods="published gappy", timed=True,
 )  # fmt: skip
 def teaser(drawn: Drawn, table: pd.DataFrame, **files: Files) -> Figure:
     """The preprint's method fails on a trajectory on which it was not trained; three sampled
     elements per mode with one system for all coordinates, and reduced positions with sampled
     elements (ECSW), follow the full-order model. One frame of the first test trajectory of two
-    scenes; below each picture the position error over all frames before the horizon, against the
-    full-order model, and the time per frame. $r$ and $k$ are the numbers of modes for projections
-    and for positions. The grey outline is the full-order model; what lies outside its frame is cut
-    off.
+    scenes; below each picture the position error before the horizon, against the full-order model,
+    and the time per frame. $r$ and $k$ are the numbers of modes for projections and positions. The
+    outline is the full-order model; what lies outside its picture is cut off.
     """
     rows = [_teaser_row(drawn, each, table, files) for each in drawn.experiments]
     return view.draw_rows(rows, height_limit=TEASER_ROW * len(rows))

@@ -51,9 +51,9 @@ HEIGHT = 2.15  # of the figure, inches
 def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -> Figure:
     """In some scenes a tiny change of the initial positions grows until two full-order simulations
     disagree. Relative difference of two full-order simulations whose initial positions differ by
-    {sensitivity.reference} of the size of the body, in each frame. The horizon of a scene (dot,
-    with its frame in the label) is the first frame at which the difference exceeds
-    {sensitivity.threshold}; from there on (dotted) simulations of this scene are not evaluated.
+    {sensitivity.reference} of the size of the body. The horizon of a scene (dot) is the first frame
+    at which the difference exceeds {sensitivity.threshold}; from there on (dotted) simulations of
+    this scene are not evaluated.
     """
     floors = floors_of(sensitivity, horizon)
     scenes = [scene for scene in drawn.scenes if len(floors[scene][0])][:MOST]
