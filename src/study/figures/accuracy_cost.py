@@ -53,13 +53,14 @@ def curves(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
     timed=True,
 )  # fmt: skip
 def accuracy_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Interpolated projections are accurate with enough samples, but reduced positions, fewer
-    iterations and coarser meshes reach most errors in less time. Position error on the training
-    trajectory, before the horizon and against the converged step, and time per frame. Marks are
-    basis sizes $r$ (interpolated projections), numbers of iterations $K$ (full-order model), and
-    the best combinations of modes and tolerance (reduced positions) or of mesh, iterations and
-    acceleration (coarser mesh). Dash-dotted, where it is known: the error of the mesh itself.
-    Further down and further left is better; errors outside the axis are drawn on its limits.
+    """In this scene three elements per mode are faster than fewer iterations of the same error; at
+    larger errors reduced positions and coarser meshes are faster still. Position error on the
+    training trajectory, before the horizon and against the converged step, and time per frame.
+    Marks are basis sizes $r$ (interpolated projections), numbers of iterations $K$ (full-order
+    model), and the best combinations of modes and tolerance (reduced positions) or of mesh,
+    iterations and acceleration (coarser mesh). Dash-dotted, where it is known: the error of the
+    mesh itself. Further down and further left is better; errors outside the axis are drawn on its
+    limits.
     """
     scene = drawn.scenes_of(held(table.dropna(subset=[ERROR, TIME])))[0]
     table = table[table.scene == scene]

@@ -30,14 +30,14 @@ HEIGHT = 2.6  # of the figure, inches
 )  # fmt: skip
 def equal_error(table: pd.DataFrame) -> Figure:
     """Reduced positions with sampled elements are faster than solvers on the same large mesh; if
-    coarser meshes are allowed, they stay ahead on one bar only. Time of the fastest full-order
-    setting whose position error is at most as large, divided by the time of the reduced model (POD
-    subspace, ECSW, five iterations, two training trajectories; training not included). Each mesh
-    has a mark for each of the three test trajectories, from left to right, with the position errors
-    of the reduced model beside the large meshes; the mark is hollow where the error exceeds 10 %.
-    Vertical lines are bootstrap intervals over processes. Arrow: no full-order setting is as
-    accurate (lower bound); cross: the converged step is not accurate enough to judge; *: some rows
-    were recorded earlier or on another machine.
+    coarser meshes are allowed, they stay ahead on all test trajectories of one bar only. Time of
+    the fastest full-order setting whose position error is at most as large, divided by the time of
+    the reduced model (POD subspace, ECSW, five iterations, two training trajectories; training not
+    included). Each mesh has a mark for each of the three test trajectories, from left to right,
+    with the position errors of the reduced model beside the large meshes; the mark is hollow where
+    the error exceeds 10 %. Vertical lines are bootstrap intervals over processes. Arrow: no
+    full-order setting is as accurate (lower bound); cross: the converged step is not accurate
+    enough to judge; *: some rows were recorded earlier or on another machine.
     """
     table = table[table.iterations.notna() & (table.stiffness == 1.0)]
     table = held(table.dropna(subset=[f"{name}_speedup" for name in AGAINST]).sort_values(MESH))

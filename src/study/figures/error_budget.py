@@ -25,13 +25,12 @@ RING = {"markersize": 7.0, "markerfacecolor": "none"}  # the closure, around the
 
 @figure(title="Where the error of a reduced model arises", reads={"table": TableOf("error_budget")})
 def error_budget(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """In most scenes the step from the best approximation to the converged reduced model, the
-    Galerkin closure, adds the largest part of the error, and sampling adds little. Deformation
-    error against the converged step, before the horizon: medians of the three test trajectories of
-    each scene, for 40 POD modes. From mark to mark one simplification is added:
-    the subspace, the equations restricted to it, the sampled elements, five iterations. The cross
-    is the full-order model, which has none of them. The dashed line is an error of 10 %; errors
-    outside the axis are drawn on its limits.
+    """The restriction of the equations to the subspace (Galerkin closure) and the five iterations
+    add most of the error; the sampling adds little. Deformation error against the converged step,
+    before the horizon: medians of the three test trajectories of each scene, for 40 POD modes. From
+    mark to mark one simplification is added: the subspace, the equations restricted to it, the
+    sampled elements, five iterations. The cross is the full-order model, which has none of them.
+    The dashed line is an error of 10 %; errors outside the axis are drawn on its limits.
     """
     table = table[table.skinning == 0]
     scenes = drawn.scenes_of(table)
