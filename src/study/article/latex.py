@@ -12,6 +12,7 @@ from typing import Any
 import pandas as pd
 
 from study.artifact.text import escape
+from study.artifact.words import code
 from study.paper.build import Facts
 from study.paper.macros import SHOWN, closing, sentences
 from study.paper.numbers import NAMED, matching
@@ -120,7 +121,8 @@ def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) 
     """Filters ``column=value`` that select rows of ``table`` with the ``cells`` of a TeX row."""
     found = []
     for title, cell in zip(header, cells, strict=True):
-        for value in (_plain(cell), _plain(cell).replace(" ", "_")) if title in table else ():
+        shown = _plain(cell)
+        for value in (shown, shown.replace(" ", "_"), code(shown)) if title in table else ():
             rows = matching(table, [(title, "=", value)])
             if len(rows):
                 table = rows

@@ -39,6 +39,16 @@ def scene(name: str) -> str:
     return SCENES.get(name) or name.replace("_", " ")
 
 
+def code(text: str) -> str:
+    """Return the first name of a scene, method or trajectory whose words are ``text``, or this."""
+    whole = text.removesuffix(" (short)")
+    for known in (SCENES, METHODS, TRAJECTORIES):
+        for name, own in known.items():
+            if own == whole:
+                return name + (_SHORT if whole != text else "")
+    return text
+
+
 def method(name: str, title: str = "") -> str:
     """Return words for a reduction method of the study, else its ``title``, else its name.
 

@@ -43,7 +43,7 @@ from study.tables.effects_cost import unreliable
 
 log = logging.getLogger(__name__)
 
-PAGES = {"main": 14, "supplement": 25}  # largest allowed number of pages of each document
+PAGES = {"main": 12, "supplement": 25}  # largest allowed number of pages of each document
 
 
 class Facts(BaseModel):

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from pdrom.model.held_out import MOTIONS
+from study.artifact import words
 from study.artifact.text import escape
 from study.experiments.alternatives.experiment import NEWTON
 from study.experiments.error_budget import PARTS
@@ -19,8 +19,9 @@ from study.tables.claims.claims import NOT_DECIDED
 from study.tables.equal_error import AHEAD, REDUCED, SAME
 from study.tables.kit.results import FAILED, MEASURES, MEDIAN, over_motions, trained
 
-NONE = "--"
+NONE, TINY = "--", 1e-6
 LEFT = r">{\raggedright\arraybackslash}"
+NUMBER = r">{\raggedleft\arraybackslash}p{1.5cm}"  # column whose head may have several lines
 # Iterator over a table: first (column definitions, header), then the rows; all cells are TeX.
 Rows = Iterator[Any]
 # Tables that may break across pages.
@@ -46,6 +47,10 @@ def _line(cells: Sequence[str]) -> str:
     return " & ".join(cells) + r" \\"
 
 
+def _scene(name: str) -> str:
+    return escape(words.scene(name))
+
+
 def _name(text: str) -> str:
     """Format ``text``, the name of a scene, group or method, in typewriter."""
     return rf"\texttt{{{escape(text)}}}"
@@ -69,6 +74,11 @@ def _known(value: Any, form: Callable[[Any], str] = format_number) -> str:
     return NONE if pd.isna(value) else form(value)
 
 
+def _not_tiny(value: float) -> str:
+    """Format an error; one below a millionth only as such."""
+    return format_number(value) if value >= TINY else "$<10^{-6}$"
+
+
 def _rows(table: pd.DataFrame, **wanted: object) -> pd.DataFrame:
     for column, value in wanted.items():
         table = table[table[column] == value]
@@ -83,7 +93,8 @@ def _cell(rows: pd.DataFrame, shown: Callable[[pd.Series], Any]) -> str:
 
 _VERDICT_COLOUR = {"holds": "okgreen", "does not hold": "okred"}
 _VERDICTS = {"depends": "mixed", "not tested": NONE, "cannot be decided": NONE}
-_PARTS = {"published": "published method", "beyond": "improved method"}
+TAIL = " method"
+_PARTS = {"published": f"published{TAIL}", "beyond": f"improved{TAIL}"}
 # Claim without a figure -> TeX label of the table that shows its result.
 _SHOWN = {"C11": "reruns", "C12": "positions"}
 _SIGNS = {">=": r"$\ge$", "<=": r"$\le$"}
@@ -133,13 +144,13 @@ def interventions(gain_interventions: pd.DataFrame) -> Rows:
     """Paired comparisons: ratios of the DEIM constant and of the error, rescued simulations."""
     header = ["change", "constant", "error", "interval", "decreases in", "rescued"]
     yield "lrrrrr", header
-    for step, mesh, words in _CHANGES:
+    for step, mesh, change in _CHANGES:
         for row in _rows(gain_interventions, step=step, mesh=mesh).itertuples():
             interval = f"{_known(row.error_ratio_low)} to {_known(row.error_ratio_high)}"
             families = f"{_whole(row.families_fallen)} of {_whole(row.families)}"
             rescued = f"{_whole(row.rescued)} of {_whole(row.failing)}"
             yield [
-                words,
+                change,
                 *map(_known, (row.gain_ratio, row.error_ratio)),
                 interval,
                 families,
@@ -166,11 +177,16 @@ def square(gain_interventions: pd.DataFrame) -> Rows:
 def claims_in_full(claims_tests: pd.DataFrame) -> Rows:
     """Tests that decide a verdict: limit, number of rows within it, range of the tested values."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
-    yield "llrrrrr", ["", "test", "limit", "rows", "least", "median", "most"]
+    header = ["", "test", "limit", "rows", "least", "median", "most"]
+    yield rf"{LEFT}p{{1.9cm}}{LEFT}p{{5.6cm}}rrrrr", header
     for (claim, part), found in tests.groupby(["claim", "part"], sort=False):
         for place, test in enumerate(found.itertuples()):
             limit = f"{_SIGNS[test.compare]} {format_number(test.threshold)}"
-            opening = ["" if place else f"{claim} {_PARTS[part]}", escape(test.what), limit]
+            opening = [
+                "" if place else f"{claim} {_PARTS[part].removesuffix(TAIL)}",
+                escape(test.what),
+                limit,
+            ]
             spread = map(_known, (test.least, test.median, test.most))
             yield [*opening, f"{test.satisfied} of {test.of}", *spread]
 
@@ -205,7 +221,7 @@ def iterations(accuracy_cost: pd.DataFrame) -> Rows:
     yield "l" + "r" * len(_RUNS), ["scene", *titles]
     for scene, part in accuracy_cost.groupby("scene", sort=False):
         runs = [_rows(part, method=method, iterations=count) for method, count in _RUNS]
-        yield [_name(scene), *(_cell(run, text) for run in runs)]
+        yield [_scene(scene), *(_cell(run, text) for run in runs)]
 
 
 _TOLERANCE = "ecsw-1e-02"
@@ -214,24 +230,23 @@ _TOLERANCE = "ecsw-1e-02"
 def positions(reduced_reruns: pd.DataFrame) -> Rows:
     """Errors and speed-ups of runs in position subspaces, for the largest dimension k per scene."""
 
-    def unseen(run: pd.Series, column: str = MEDIAN) -> str:
+    def unseen(run: pd.Series) -> str:
         same = {column: run[column] for column in ("scene", "method", "k", "position_basis")}
         motions = over_motions(_rows(reduced_reruns, group="all", **same))
-        return _cell(motions, itemgetter(column))
+        return _cell(motions, itemgetter(MEDIAN))
 
     error = itemgetter("relative_error_within_horizon")
     columns: dict[str, tuple[str, str, Callable[[pd.Series], Any]]] = {
         "all": ("pod", "full", error),
-        "playback, held out": ("pod", "full", lambda run: unseen(run, "playback_error")),
-        "all, held out": ("pod", "full", unseen),
+        "all, tests": ("pod", "full", unseen),
         "sampled": ("pod", _TOLERANCE, error),
-        "sampled, held out": ("pod", _TOLERANCE, unseen),
+        "sampled, tests": ("pod", _TOLERANCE, unseen),
         "elements": ("pod", _TOLERANCE, lambda run: _whole(run.r)),
         "speed-up": ("pod", _TOLERANCE, itemgetter("speedup")),
-        "hrpd": ("pod", "hrpd", error),
+        "fitted": ("pod", "hrpd", error),
         "skinning, all": ("skinning", "full", error),
     }
-    yield "l" + "r" * len(columns), ["scene", *columns]
+    yield "l" + NUMBER * len(columns), ["scene", *columns]
     for scene in reduced_reruns.scene.unique():
         runs = trained(_rows(reduced_reruns, scene=scene, group="all"))
         runs = runs[runs.k == runs.k.max()]
@@ -240,25 +255,21 @@ def positions(reduced_reruns: pd.DataFrame) -> Rows:
                 _cell(_rows(runs, position_basis=basis, method=method), text)
                 for basis, method, text in columns.values()
             ]
-            yield [_name(scene), *cells]
+            yield [_scene(scene), *cells]
 
 
 def speedups(speedups: pd.DataFrame) -> Rows:
     """Speed-ups that the text cites, with confidence intervals, errors and costs of training."""
-    yield "llrlrrrrrr", [
-        "scene", "reduction", "full ms", "speed-up", "training", "held out", "playback", "run (s)",
-        "reduction (s)", "frames",
-    ]  # fmt: skip
+    heads = "full ms", "training", "tests", "repaid"
+    yield f"ll{2 * 'r'}{2 * NUMBER}{NUMBER}", ["scene", "reduction", "speed-up", *heads]
     for row in speedups.itertuples():
         size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
         frames = row.frames_to_break_even  # frames until time saved repays training; 2 digits shown
         yield [
-            *map(_name, (row.scene, f"{row.method}, {size}")),
-            _known(row.full_ms),
-            _known(row.shown, escape) + (" (loses)" if row.loses == 1 else ""),
-            f"{_known(row.error_train)} ({_known(row.deformation_train)})",
-            f"{_known(row.error_heldout)} ({_known(row.deformation_heldout)})",
-            *map(_known, (row.playback_error, row.training_s, row.reduction_s)),
+            _scene(row.scene),
+            f"{escape(words.method(row.method))}, ${size}$",
+            _known(row.shown, escape),
+            *map(_known, (row.full_ms, row.error_train, row.error_heldout)),
             "never" if pd.isna(frames) else _rounded(frames),
         ]
 
@@ -271,9 +282,9 @@ _COMPARED = (
     (FULL, "deim-joint", "preprint's selection"),
     (FULL, "deim", "entry-wise DEIM"),
     (FULL, "block-deim", "element-wise DEIM"),
-    (FULL, "gappy", "element-wise DEIM, three elements for each mode"),
+    (FULL, "gappy", "three elements per mode"),
     (FULL, "pod", "orthogonal projection, all elements"),
-    ("pod", "ecsw-1e-02", "reduced positions, sampled elements"),
+    ("pod", "ecsw-1e-02", "reduced positions (ECSW)"),
     ("pod", "full", "reduced positions, all elements"),
 )
 
@@ -282,12 +293,12 @@ def payoff(payoff: pd.DataFrame) -> Rows:
     """Numbers of cases in which a method is accurate, and faster than the full-order model."""
     header = ["method", "cases", "accurate", "on test trajectories", "faster", "speed-up"]
     yield "lrrrrr", header
-    for basis, method, words in _COMPARED:
+    for basis, method, title in _COMPARED:
         own = _rows(payoff, measure=MEASURES[0], position_basis=basis, method=method)
         for row in own.itertuples():
             test = _whole(row.accurate_heldout) if row.heldout else NONE
             counts = map(_whole, (row.scenes, row.accurate))
-            yield [words, *counts, test, _known(row.pays, _whole), _known(row.best_speedup)]
+            yield [title, *counts, test, _known(row.pays, _whole), _known(row.best_speedup)]
 
 
 APART = 2.0  # least ratio of the validation errors of two neighbours in the table frontier
@@ -314,42 +325,35 @@ def frontier(frontier: pd.DataFrame) -> Rows:
     Settings with a validation error above 10 %, or hardly below that of the row before, are left
     out.
     """
-    header = ["scene", "setting", "validation", "test (deformation)", "time", "training", "ahead"]
+    header = ["scene", "setting", "validation", "test", "time", "training", "ahead"]
     yield "llrrrrr", header
     shown = frontier[(frontier.part != SAME) & ~(frontier.validation_error > FAILED)]
     for (scene, vertices, _), own in shown.groupby(["scene", "vertices", "part"], sort=False):
-        opening, before = f"{_name(scene)}, {_whole(vertices)}", math.inf
+        opening, before = f"{_scene(scene)}, {_whole(vertices)}", math.inf
         for row in own.itertuples():
             if row.validation_error > before / APART:
                 continue
-            tested = f"{_known(row.position_error)} ({_known(row.deformation_error)})"
-            first = [opening, _setting(row), _known(row.validation_error), tested]
+            errors = map(_known, (row.validation_error, row.position_error))
+            first = [opening, _setting(row), *errors]
             training = _known(row.offline_ratio, _rounded)
-            ahead = [getattr(row, name) for name in AHEAD if row.part == REDUCED]
+            ahead = [getattr(row, name) for name in list(AHEAD)[:2] if row.part == REDUCED]
             yield [*first, _known(row.time_ratio), training, " / ".join(map(_known, ahead)) or NONE]
             opening, before = "", row.validation_error
 
 
-def scenes(
-    reduced_reruns: pd.DataFrame, scenes: pd.DataFrame, test_trajectories: pd.DataFrame
-) -> Rows:
-    """Scenes: groups, mesh size, frames, first frame in which runs are not compared, and errors.
-
-    These are the deformation errors of the full-order runs of the test trajectories.
-    """
+def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
+    """Scenes: name in the code, groups, mesh size, frames, first frame that is not predictable."""
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
-    header = ["scene", "groups (weight)", "vertices", "elements", "frames", "horizon", *MOTIONS]
-    yield rf"l{LEFT}p{{3.3cm}}rrrrrrr", header
-
+    header = ["scene", "name", "groups (weight)", "vertices", "elements", "frames", "horizon"]
+    yield rf"ll{LEFT}p{{2.5cm}}rrrr", header
     for row in scenes.itertuples():
         end = horizon.get(row.scene)
         shown = "run" if end == row.frames and not pd.isna(end) else _known(end, _whole)
         # numbers such as 1e+06 are written as powers of ten
         powers = re.sub(r"([\d.]+)e\+?(-?)0*(\d+)", r"$\1\\cdot 10^{\2\3}$", _group(row.groups))
         sizes = map(str, (row.vertices, row.elements, row.frames))
-        runs = [_rows(test_trajectories, scene=row.scene, motion=motion) for motion in MOTIONS]
-        errors = [_cell(run, lambda own: _known(own.full_order_deformation_error)) for run in runs]
-        yield [_name(row.scene), powers.replace(r"$1\cdot 10", "$10"), *sizes, shown, *errors]
+        names = _scene(row.scene), _name(row.scene)
+        yield [*names, powers.replace(r"$1\cdot 10", "$10"), *sizes, shown]
 
 
 def trajectories(test_trajectories: pd.DataFrame) -> Rows:
@@ -357,12 +361,12 @@ def trajectories(test_trajectories: pd.DataFrame) -> Rows:
     columns = {
         "rigid": "deformation", "affine": "affine", "replay": "replay_error",
         "shape": "replay_deformation_error", "full order": "full_order_error",
-        "its shape": "full_order_deformation_error", "reference": "reference_error",
-        "its own": "reference_deformation_error",
+        "its shape": "full_order_deformation_error", "reference": "reference_deformation_error",
     }  # fmt: skip
-    yield "ll" + "r" * len(columns), ["scene", "trajectory", *columns]
+    yield "ll" + "r" * len(columns), ["scene", "", *columns]
     for _, row in test_trajectories.iterrows():
-        yield [_name(row.scene), row.motion, *(_known(row[name]) for name in columns.values())]
+        first = _scene(row.scene), words.TRAJECTORIES[row.motion]
+        yield [*first, *(_known(row[name], _not_tiny) for name in columns.values())]
 
 
 def error_budget(error_budget: pd.DataFrame) -> Rows:
@@ -374,19 +378,19 @@ def error_budget(error_budget: pd.DataFrame) -> Rows:
         most = own.part[own.largest.astype(bool)].value_counts()
         largest = ", ".join(f"{part} {count}" for part, count in most.items())
         size = f"{k}" + (f" + {skinning}" if skinning else "")
-        yield [_name(scene), size, *map(_known, medians), largest]
+        yield [_scene(scene), size, *map(_known, medians), largest]
 
 
 def methods(methods: pd.DataFrame) -> Rows:
     """Reduction methods: centring, rows, choice and number of samples, solver for coefficients."""
-    header = ["method", "title", "centring", "rows", "selection", "samples", "solve"]
-    yield rf"l{LEFT}p{{3.3cm}}lllll", header
+    yield "lllllll", ["method", "name", "centring", "rows", "selection", "samples", "solve"]
     for row in methods.itertuples():
         least = "one" if row.oversampling == 1 else row.oversampling
         bound = row.gain_bound
         samples = f"{least} a mode" if pd.isna(bound) else rf"$\gamma \le {bound:g}$"
         chosen = [NONE, NONE] if row.rows == "all" else [row.selection, samples]
-        titles = [_name(row.method), escape(row.title), row.centring, row.rows]
+        own = escape(words.method(row.method, row.title))
+        titles = [own, _name(row.method), row.centring, row.rows]
         yield [*titles, *chosen, row.solve]
 
 
@@ -398,7 +402,7 @@ def ranks(singular_values: pd.DataFrame) -> Rows:
         real = part[part.above_roundoff]
         cells = [_rows(real, component=component) for component in (6, 10, 20)]
         decay = [_cell(cell, itemgetter("relative")) for cell in cells]
-        yield [_name(scene), _group(group), str(len(real)), *decay]
+        yield [_scene(scene), _group(group), str(len(real)), *decay]
 
 
 def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
@@ -413,10 +417,13 @@ def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
 
     table = _rows(trained(reduced_reruns), position_basis=FULL)
     ran = table[(table.frames > 0) | table.blowup_frame.notna()]
-    yield "ll" + "r" * len(methods), ["scene", "group", *map(escape, methods.method)]
+    yield (
+        "ll" + NUMBER * len(methods),
+        ["scene", "group", *map(escape, map(words.method, methods.method))],
+    )
     for (scene, group), part in ran.groupby(["scene", "group"], sort=False):
         runs = [_rows(part, method=method).sort_values("r").tail(1) for method in methods.method]
-        yield [_name(scene), _group(group), *(_cell(run, text) for run in runs)]
+        yield [_scene(scene), _group(group), *(_cell(run, text) for run in runs)]
 
 
 _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
@@ -439,8 +446,9 @@ def stability(stability: pd.DataFrame) -> Rows:
         median, largest, of_sweep = map(format_number, energies)
         accurate = f"{(sweep.outcome == 'accurate').sum()} of {len(sweep)}"
         counts = [str((runs.outcome == outcome).sum()) for outcome in _OUTCOMES]
-        title = method if basis == FULL else f"{method}, {basis} subspace"
-        yield [_name(title), *counts, median, largest, accurate, of_sweep][: len(header)]
+        own = escape(words.method(method))
+        title = own if basis == FULL else f"{own}, {basis} subspace"
+        yield [title, *counts, median, largest, accurate, of_sweep][: len(header)]
 
 
 TEX_TABLES: dict[str, Callable[..., Rows]] = {

@@ -152,7 +152,7 @@ FRAGILE = 0.005
 
 
 @table(
-    title="Where each method can be trusted",
+    title="Outcome of every reduced simulation",
     columns=(
         *shared("scene method r"),
         number("h", "time step", "s", compared="exact"),

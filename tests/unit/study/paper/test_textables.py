@@ -48,7 +48,7 @@ TABLES = {
         "scene motion deformation affine replay_error replay_deformation_error full_order_error "
         "full_order_deformation_error reference_error reference_deformation_error",
         ("bar_a", "heldout", 0.25, 0.125, 0.75, 1.0, 0.5, 2.0, 0.0, 0.0625),
-        ("bar_a", "kick", 0.5, 0.25, 0.5, 0.75, 0.25, None, 0.0, None),
+        ("bar_a", "kick", 0.5, 0.25, 0.5, 0.75, 0.25, None, 0.0, 1e-9),
     ),
     "error_budget": frame(
         "motion part error deformation_error largest",
@@ -150,9 +150,9 @@ C2 & x & \textcolor{okgrey}{--} & \textcolor{okgreen}{holds} & \texttt{a} \\
 C3 & y & \textcolor{okred}{does not hold}; both errors: mixed
   & \textcolor{okred}{does not hold} & \texttt{b} \\
 % claims_in_full
-C1 published method & some\_one & $\ge$ 0.10 & 1 of 2 & 0.050 & 0.10 & \ensuremath{\infty} \\
+C1 published & some\_one & $\ge$ 0.10 & 1 of 2 & 0.050 & 0.10 & \ensuremath{\infty} \\
  & others & $\ge$ 0.10 & 3 of 4 & 0 & 0.50 & 1 \\
-C1 improved method & all & $\le$ 0.050 & 0 of 0 & -- & -- & -- \\
+C1 improved & all & $\le$ 0.050 & 0 of 0 & -- & -- & -- \\
 % only the changes of the paper's table
 % interventions
 three elements per mode instead of one, sheets & 0.50 & 0.25 & 0.12 to 0.50 & 3 of 4 & 2 of 5 \\
@@ -163,53 +163,49 @@ bars, separate systems & 2 of 8 & 0.75 & 1 of 8 & 0.50 & 0.62 \\
 C1 & holds & mixed & holds & -- & holds & -- \\
 % the horizon of a calm scene is its run
 % scenes
-\texttt{bar\_a} & triangle strain ($10^{7}$) & 400 & 722 & 10 & run & 2 & -- & -- \\
-\texttt{b} & spring (1) & 9 & 12 & 20 & 7 & -- & -- & -- \\
-\texttt{not\_run} & spring (1) & 9 & 12 & 20 & -- & -- & -- & -- \\
+bar a & \texttt{bar\_a} & triangle strain ($10^{7}$) & 400 & 722 & 10 & run \\
+b & \texttt{b} & spring (1) & 9 & 12 & 20 & 7 \\
+not run & \texttt{not\_run} & spring (1) & 9 & 12 & 20 & -- \\
 % trajectories
-\texttt{bar\_a} & heldout & 0.25 & 0.12 & 0.75 & 1 & 0.50 & 2 & 0 & 0.062 \\
-\texttt{bar\_a} & kick & 0.50 & 0.25 & 0.50 & 0.75 & 0.25 & -- & 0 & -- \\
+bar a & test 1 & 0.25 & 0.12 & 0.75 & 1 & 0.50 & 2 & 0.062 \\
+bar a & test 2 & 0.50 & 0.25 & 0.50 & 0.75 & 0.25 & -- & $<10^{-6}$ \\
 % where there is no deformation, the position error counts
 % error_budget
-\texttt{bar\_a} & 40 & 0.12 & 0.50 & -- & -- & -- & closure 1 \\
-\texttt{bar\_a} & 40 + 40 & 0.75 & 0.75 & -- & -- & -- & span 1 \\
+bar a & 40 & 0.12 & 0.50 & -- & -- & -- & closure 1 \\
+bar a & 40 + 40 & 0.75 & 0.75 & -- & -- & -- & span 1 \\
 % methods
-\texttt{pod} & A \& B & none & all & -- & -- & square \\
-\texttt{deim\_x} & 50 \% & affine & scalar & greedy & 3 a mode & qr \\
-\texttt{y} & c & affine & scalar & greedy & one a mode & qr \\
-\texttt{z} & d & affine & scalar & greedy & $\gamma \le 2.5$ & qr \\
+orthogonal projection & \texttt{pod} & none & all & -- & -- & square \\
+50 \% & \texttt{deim\_x} & affine & scalar & greedy & 3 a mode & qr \\
+c & \texttt{y} & affine & scalar & greedy & one a mode & qr \\
+d & \texttt{z} & affine & scalar & greedy & $\gamma \le 2.5$ & qr \\
 % above round-off
 % ranks
-\texttt{bar\_a} & edge spring & 3 & 0.50 & 0.010 & -- \\
+bar a & edge spring & 3 & 0.50 & 0.010 & -- \\
 % the largest size that ran: without ranks beyond the data, and subspaces
 % reruns
-\texttt{bar\_a} & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} & -- & -- \\
+bar a & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} & -- & -- \\
 % what ran
 % stability
-\texttt{pod} & 1 & 1 & 0 & 1 & 3 & \ensuremath{\infty} & 0 of 1 & 2 \\
-\texttt{ecsw, pod subspace} & 1 & 0 & 0 & 0 & 0.50 & 0.50 & 0 of 0 & n/a \\
+orthogonal projection & 1 & 1 & 0 & 1 & 3 & \ensuremath{\infty} & 0 of 1 & 2 \\
+reduced positions (ECSW), pod subspace & 1 & 0 & 0 & 0 & 0.50 & 0.50 & 0 of 0 & n/a \\
 % error and time
 % iterations
-\texttt{bar\_a} & 0.50 (0.25) & -- & 0.12 (2) & -- & 0.062 (3) \\
+bar a & 0.50 (0.25) & -- & 0.12 (2) & -- & 0.062 (3) \\
 % positions
-\texttt{b} & 0.12 & 0.75 & 0.50 & 0.38 & -- & 90 & 4 & -- & -- \\
+b & 0.12 & 0.50 & 0.38 & -- & 90 & 4 & -- & -- \\
 % two digits of a count
 % speedups
-\texttt{bar\_a} & \texttt{deim\_x, r = 6} & 1.2 & 0.50 (loses) & 0.10 (0.25) & -- (--) & -- & 2
-  & 0.50 & never \\
-\texttt{b} & \texttt{ecsw, k = 20} & 8 & 66 to 73 & 0.010 (0.25) & 0.020 (--) & 0.50 & 1 & 3
-  & 1200 \\
+bar a & deim x, $r = 6$ & 0.50 & 1.2 & 0.10 & -- & never \\
+b & reduced positions (ECSW), $k = 20$ & 66 to 73 & 8 & 0.010 & 0.020 & 1200 \\
 % position errors only; full-order settings have no test trajectories
 % payoff
 full-order model, coarser mesh & 3 & 2 & -- & 1 & \ensuremath{\infty} \\
-reduced positions, sampled elements & 3 & 2 & 2 & 1 & 0.50 \\
+reduced positions (ECSW) & 3 & 2 & 2 & 1 & 0.50 \\
 % settings accurate to a tenth and not too close, without those on the same mesh
 % frontier
-\texttt{bar\_a}, 9 & 30 + 10, $\tau = 0.01$, $K = 5$, $n = 2$ & 0.050 & 0.062 (0.12)
-  & 0.50 & 1200 & 2 / 1.5 / -- \\
- & 20, $\tau = 0.1$, converged, $n = 1$ & 0.020 & 0.062 (--)
-  & 0.75 & 90 & -- / -- / -- \\
-\texttt{bar\_a}, 9 & 4 vertices, $K = 3$, accelerated & 0.10 & 0.12 (0.25) & 1 & -- & -- \\
+bar a, 9 & 30 + 10, $\tau = 0.01$, $K = 5$, $n = 2$ & 0.050 & 0.062 & 0.50 & 1200 & 2 / 1.5 \\
+ & 20, $\tau = 0.1$, converged, $n = 1$ & 0.020 & 0.062 & 0.75 & 90 & -- / -- \\
+bar a, 9 & 4 vertices, $K = 3$, accelerated & 0.10 & 0.12 & 1 & -- & -- \\
 """
 
 
@@ -233,9 +229,8 @@ def test_unreliable_times_leave_no_speed_up_in_any_table(tmp_path):
     assert "unreliable" in said
     text = "".join(tex_table(name, TABLES | tables) for name in TEX_TABLES)
     before = "".join(tex_table(name, TABLES) for name in TEX_TABLES)
-    for number in ("66 to 73", "(loses)"):
-        assert number in before
-        assert number not in text
+    assert "66 to 73" in before
+    assert "66 to 73" not in text
 
 
 PAGE = r"""\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}\usepackage{longtable}
