@@ -25,7 +25,7 @@ NUMBER = r">{\raggedleft\arraybackslash}p{1.5cm}"  # column whose head may have 
 # Iterator over a table: first (column definitions, header), then the rows; all cells are TeX.
 Rows = Iterator[Any]
 # Tables that may break across pages.
-LONG = ("tab_scenes", "tab_trajectories", "tab_ranks", "tab_frontier")
+LONG = ("tab_scenes", "tab_trajectories", "tab_frontier")
 FULL = "full"  # value of column position_basis for runs with unreduced positions
 
 
@@ -394,17 +394,6 @@ def methods(methods: pd.DataFrame) -> Rows:
         yield [*titles, *chosen, row.solve]
 
 
-def ranks(singular_values: pd.DataFrame) -> Rows:
-    """Numerical rank and singular value decay of the snapshots of each constraint group."""
-    decays = [r"$\sigma_6/\sigma_1$", r"$\sigma_{10}/\sigma_1$", r"$\sigma_{20}/\sigma_1$"]
-    yield "llrrrr", ["scene", "group", "rank", *decays]
-    for (scene, group), part in singular_values.groupby(["scene", "group"], sort=False):
-        real = part[part.above_roundoff]
-        cells = [_rows(real, component=component) for component in (6, 10, 20)]
-        decay = [_cell(cell, itemgetter("relative")) for cell in cells]
-        yield [_scene(scene), _group(group), str(len(real)), *decay]
-
-
 def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
     """Relative error of each method at its largest basis size r, over frames before the horizon."""
 
@@ -454,7 +443,7 @@ def stability(stability: pd.DataFrame) -> Rows:
 TEX_TABLES: dict[str, Callable[..., Rows]] = {
     f"tab_{make.__name__}": make
     for make in (
-        claims, claims_in_full, interventions, square, replications, scenes, methods, ranks, reruns,
+        claims, claims_in_full, interventions, square, replications, scenes, methods, reruns,
         stability, iterations, positions, speedups, payoff, frontier, trajectories, error_budget,
     )
 }  # fmt: skip

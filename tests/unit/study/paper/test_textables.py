@@ -62,10 +62,6 @@ TABLES = {
         ("bar_a", "fom-anderson", 10, 0.0625, 3.0),
         ("bar_a", "pod", None, 0.03, 1.0),
     ),
-    "singular_values": frame(
-        "component relative above_roundoff",
-        (1, 1.0, True), (6, 0.5, True), (10, 0.01, True), (20, 1e-15, False),
-    ).assign(scene="bar_a", group="edge_spring"),
     "stability": frame(
         "method position_basis experiment outcome energy_ratio",
         ("full", "full", "rerun", "accurate", 1.0),
@@ -178,9 +174,6 @@ orthogonal projection & \texttt{pod} & none & all & -- & -- & square \\
 50 \% & \texttt{deim\_x} & affine & scalar & greedy & 3 a mode & qr \\
 c & \texttt{y} & affine & scalar & greedy & one a mode & qr \\
 d & \texttt{z} & affine & scalar & greedy & $\gamma \le 2.5$ & qr \\
-% above round-off
-% ranks
-bar a & edge spring & 3 & 0.50 & 0.010 & -- \\
 % the largest size that ran: without ranks beyond the data, and subspaces
 % reruns
 bar a & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} & -- & -- \\
