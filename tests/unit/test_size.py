@@ -11,8 +11,8 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 33_940,
-    "lines of tests": 21_000,
+    "lines of src": 34_140,
+    "lines of tests": 21_150,
     "words of documentation": 20_050,
     "tables": 27,
     "figures": 22,

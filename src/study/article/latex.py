@@ -41,7 +41,6 @@ _SHORT = re.compile(
 REPLACED = r"""
 \newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
 \newcommand{\tablefile}[1]{\input{#1.tex}}
-\newenvironment{heretable}{\begin{table}}{\end{table}}
 \newcommand{\pictureof}[2]{\begin{figure}\includegraphics{#1.pdf}\caption{#2}\label{fig:#1}\end{figure}}
 """
 

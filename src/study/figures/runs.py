@@ -322,12 +322,13 @@ def _colours() -> ScalarMappable:
     }, scenes="bar_release spring_oop", methods="published gappy", timed=True,
 )  # fmt: skip
 def teaser(drawn: Drawn, table: pd.DataFrame, **files: Files) -> Figure:
-    """The preprint's method fails on a trajectory on which it was not trained; three sampled
-    elements per mode with one system for all coordinates, and reduced positions with sampled
-    elements (ECSW), follow the full-order model. One frame of the first test trajectory of two
-    scenes; below each picture the position error before the horizon, against the full-order model,
-    and the time per frame. $r$ and $k$ are the numbers of modes for projections and positions. The
-    outline is the full-order model; what lies outside its picture is cut off.
+    """The preprint's method fails on a trajectory on which it was not trained. Two methods follow
+    the full-order model: three sampled elements per mode with one system for all coordinates, and
+    reduced positions with sampled elements (ECSW). Each row shows one frame of the first test
+    trajectory of a scene. The numbers below a picture are the position error over all predictable
+    frames, relative to the full-order model, and the time per frame. The projections have $r$ modes
+    in columns 2 and 3, the positions $k$ modes in column 4. Outlines show the full-order model;
+    pictures are cropped to its surroundings.
     """
     rows = [_teaser_row(drawn, each, table, files) for each in drawn.experiments]
     return view.draw_rows(rows, height_limit=TEASER_ROW * len(rows))

@@ -103,13 +103,9 @@ def names_of(source: str) -> list[str]:
 
 
 class Number(NamedTuple):
-    """A number in the manuscript's text, and the table cells from which it is computed.
+    """A number of the text as TeX, its unrounded value, and the cells from which it is computed.
 
-    text : the number as TeX
-    value : unrounded value, None if there is none
-    rows : row numbers of these cells in ``table``, from 0
-    take : name of the aggregate over these cells, None for a single cell
-    key : `Entry.key`
+    ``rows`` of ``table`` are counted from 0; ``take`` and ``key`` are those of the `Entry`.
     """
 
     text: str
@@ -176,7 +172,7 @@ def _selected(
 
 
 def unexpected(known: Entries, tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:
-    """Map names of numbers that are not as the text expects to what was found, and expected."""
+    """Map names of numbers that are not as expected to what was found and expected."""
     faults = {}
     for name, entry in known.items():
         if entry.expect and is_held(name, known, tables):
