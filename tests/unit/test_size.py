@@ -13,7 +13,7 @@ from places import tracked
 LIMITS = {
     "lines of src": 34_140,
     "lines of tests": 21_150,
-    "words of documentation": 20_050,
+    "words of documentation": 20_080,
     "tables": 27,
     "figures": 22,
     "experiments": 20,
