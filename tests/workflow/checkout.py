@@ -21,7 +21,10 @@ TOUCH = (
     "--touch",
 )
 DOCUMENTS = ("paper/main.tex", "paper/supplement.tex", "paper/preamble.tex")
-PAPER = (*DOCUMENTS, "paper/own", "paper/sections", "paper/supplement", "paper/references.bib")
+PAPER = (
+    *DOCUMENTS, "paper/own", "paper/sections", "paper/supplement", "paper/references.bib",
+    "paper/numbers.yaml",
+)  # fmt: skip
 PARTS = ("Snakefile", "config", *PAPER, "src", "workflow")
 
 
