@@ -54,7 +54,7 @@ section~\ref{sec:more} \cite{Page63}. C1 holds.
 \paragraph{Opening.} Words.
 \begin{equation}\label{eq:one} a = b \end{equation}
 \figureof{ladder}
-\longtableof{\small}{tab:payoff}{Caption.}{tab_ranks.tex}
+\longtableof{\small}{tab:payoff}{Caption.}{tab_frontier.tex}
 \end{document}
 """
 SUPPLEMENT = r"""
@@ -119,7 +119,7 @@ def ranks(payoff: pd.DataFrame) -> Iterator[Any]:
 
 
 INPUTS = (
-    "numbers.json", "tab_ranks.tex", "macros.tex", "figures.tex", "main.bbl", "supplement.bbl",
+    "numbers.json", "tab_frontier.tex", "macros.tex", "figures.tex", "main.bbl", "supplement.bbl",
 )  # fmt: skip
 
 
@@ -209,7 +209,7 @@ def one_table() -> Iterator[None]:
     """The table that the manuscripts of these tests contain, in place of those of the study."""
     with pytest.MonkeyPatch.context() as patch:
         for module in (build, textables):
-            patch.setattr(module, "TEX_TABLES", {"tab_ranks": ranks})
+            patch.setattr(module, "TEX_TABLES", {"tab_frontier": ranks})
         yield
 
 
