@@ -29,16 +29,11 @@ _COUNTS = ("count", "distinct")
 # The text shows a count only if a row of the table has the names in these columns that are asked.
 _LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
 AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
-    "max": pd.Series.max,
-    "min": pd.Series.min,
-    "median": pd.Series.median,
-    "count": len,
+    "max": pd.Series.max, "min": pd.Series.min, "median": pd.Series.median, "count": len,
     "distinct": pd.Series.nunique,
-}
+}  # fmt: skip
 _SIGNS = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
 _EXPECTATION = r"^(>=|<=|>|<) (\S+)$"
-
-
 _Value = str | int | float | bool
 
 

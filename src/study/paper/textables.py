@@ -371,12 +371,13 @@ def trajectories(test_trajectories: pd.DataFrame) -> Rows:
 
 def error_budget(error_budget: pd.DataFrame) -> Rows:
     """Error budget: median deformation error of the test trajectories by part, and largest part."""
-    yield "lr" + "r" * (len(PARTS) + 1), ["scene", "columns", *map(escape, PARTS), "largest"]
+    parts = ["iterations" if part == "run" else part.replace("_", " ") for part in PARTS]
+    yield "lr" + "r" * (len(parts) + 1), ["scene", "columns", *parts, "largest"]
     for (scene, k, skinning), own in error_budget.groupby(["scene", "k", "skinning"], sort=False):
         error = own.deformation_error.fillna(own.error)
         medians = error.groupby(own.part).median().reindex(PARTS)
         most = own.part[own.largest.astype(bool)].value_counts()
-        largest = ", ".join(f"{part} {count}" for part, count in most.items())
+        largest = ", ".join(f"{part} {n}" for part, n in most.items()).replace("run", "iterations")
         size = f"{k}" + (f" + {skinning}" if skinning else "")
         yield [_scene(scene), size, *map(_known, medians), largest]
 
@@ -435,8 +436,11 @@ def stability(stability: pd.DataFrame) -> Rows:
         median, largest, of_sweep = map(format_number, energies)
         accurate = f"{(sweep.outcome == 'accurate').sum()} of {len(sweep)}"
         counts = [str((runs.outcome == outcome).sum()) for outcome in _OUTCOMES]
-        own = escape(words.method(method))
-        title = own if basis == FULL else f"{own}, {basis} subspace"
+        own = words.method(method) if method != "full" else "reduced positions, all elements"
+        sampled = method.startswith("ecsw-")
+        tolerance = rf", $\tau = {format_number(float(method[5:]))}$" if sampled else ""
+        columns = "" if basis == FULL else f", {'POD' if basis == 'pod' else basis} columns"
+        title = f"{escape(own)}{tolerance}{columns}"
         yield [title, *counts, median, largest, accurate, of_sweep][: len(header)]
 
 
