@@ -241,7 +241,7 @@ MAP = "src/study/figures/stability_map.py"
             ("config/claims.yaml", "threshold: 0.7", "threshold: 0.71"),
             {f"tables/{name}.csv" for name in CLAIMS},
         ),
-        ((MAP, "End of every run on the training motion", "End of every run"), set()),
+        ((MAP, "Outcome of every reduced simulation", "Outcomes"), set()),
     ],
     ids=["threshold of a claim", "caption"],
 )

@@ -180,7 +180,7 @@ bar a & edge spring & 0.25 & \textcolor{okred}{blow-up, 4} & -- & -- \\
 % what ran
 % stability
 orthogonal projection & 1 & 1 & 0 & 1 & 3 & \ensuremath{\infty} & 0 of 1 & 2 \\
-reduced positions (ECSW), pod subspace & 1 & 0 & 0 & 0 & 0.50 & 0.50 & 0 of 0 & n/a \\
+reduced positions (ECSW), POD columns & 1 & 0 & 0 & 0 & 0.50 & 0.50 & 0 of 0 & n/a \\
 % error and time
 % iterations
 bar a & 0.50 (0.25) & -- & 0.12 (2) & -- & 0.062 (3) \\
