@@ -324,9 +324,9 @@ def _colours() -> ScalarMappable:
 def teaser(drawn: Drawn, table: pd.DataFrame, **files: Files) -> Figure:
     """The preprint's method fails on a test trajectory, on which it was not trained. Two other
     reduced models stay close to the full-order model. Each row shows one frame of a scene. Below a
-    picture: relative position error over the frames that can be predicted (figure 2), against
-    the full-order model, and time per frame. Column 2: projections by our implementation of the
-    preprint's code, with $r$ modes. Column 3: the same with three elements per mode and one
+    picture: relative position error against the full-order model, until the time up to which the
+    scene can be predicted (figure 2), and time per frame. Column 2: projections with $r$ modes,
+    chosen as in the preprint's code. Column 3: the same with three elements per mode and one
     interpolation for all coordinates. Column 4: positions by $k$ modes, with sampled elements
     (ECSW). Outlines show the full-order model; what lies far outside of them is cut off.
     """
