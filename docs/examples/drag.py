@@ -4,7 +4,7 @@ from pdrom.api import build_scene, run, train, view
 
 
 def bar(name, *more):
-    """A bar that is pinned on the left."""
+    """Return the scene of a bar that is fixed on the left."""
     return build_scene(
         name=name,
         mesh={"kind": "bar", "nx": 20, "ny": 4, "nz": 4},
@@ -23,5 +23,5 @@ move = {"effect": "translate", "select": "x_max", "offset": [0.0, 0.8, 0.5], "ov
 hanging, pulled = run(bar("hanging")), run(bar("pulled", move))
 model = train(hanging, pulled, modes=20)
 print(model)
-model.view("drag.html", hanging)  # both ends are handles; the wires are the full-order run
+model.view("drag.html", hanging)  # drag both ends; wires show the full-order run
 view("drag.png", pulled, model.run(pulled.scene))

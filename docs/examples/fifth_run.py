@@ -4,14 +4,14 @@ from pdrom.api import build_scene, run, train, view
 
 
 def pulled(name, offset):
-    """A bar whose right end is moved by ``offset`` (m) within a second, and then let go."""
+    """Return the scene of a bar whose right end moves by ``offset`` (m) and is then released."""
     move = {"effect": "translate", "select": "x_max", "offset": offset, "over": 60, "until": 60}
     return build_scene(
         name=name,
         mesh={"kind": "bar", "nx": 16, "ny": 3, "nz": 3},
         masses=[{"density": 1000.0}],
         frames=80,
-        iterations=50,  # so that the full order, too, is close to convergence
+        iterations=50,  # the full-order run is nearly converged
         anderson_window=5,
         effects=[
             {"effect": "gravity"},

@@ -1,4 +1,4 @@
-"""A mesh of one's own, which the wind blows over a ball."""
+"""Simulate a mesh given by arrays, which the wind blows over a ball."""
 
 import numpy as np
 

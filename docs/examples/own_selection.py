@@ -1,4 +1,4 @@
-"""An own selection of elements against the built-in one."""
+"""Compare a user-defined selection of elements with the built-in selection."""
 
 import numpy as np
 from scipy.optimize import nnls
@@ -7,7 +7,7 @@ from pdrom.api import build_scene, plot, run, train
 
 
 def at_random(G, b, tolerance):
-    """Random elements with non-negative factors: more of them until the residual is small."""
+    """Add random elements with non-negative factors until the residual is small."""
     order = np.random.default_rng(1).permutation(G.shape[1])
     for count in range(20, G.shape[1] + 20, 20):
         chosen = np.sort(order[:count])

@@ -1,4 +1,4 @@
-"""A sheet in three steps: describe it, run it, look at it."""
+"""Describe a sheet, simulate it and look at it."""
 
 from pdrom.api import build_scene, run, view
 
@@ -16,5 +16,5 @@ scene = build_scene(
 )
 full = run(scene)
 print(full)
-view("sheet.html", full)  # a page: turn the sheet, move through the frames
+view("sheet.html", full)  # a page to turn the sheet and to play the frames
 view("sheet.png", full)

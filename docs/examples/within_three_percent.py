@@ -1,4 +1,4 @@
-"""The smallest of the models of 20, 40 and 80 modes whose errors are within 3 %."""
+"""Train the smallest model of 20, 40 or 80 modes whose errors are within 3 %."""
 
 from pdrom.api import build_scene, plot, run, train
 
@@ -7,7 +7,7 @@ scene = build_scene(
     mesh={"kind": "bar", "nx": 20, "ny": 4, "nz": 4},
     masses=[{"density": 1000.0}],
     frames=60,
-    iterations=50,  # so that the full order, too, is close to convergence
+    iterations=50,  # the full-order run is nearly converged
     anderson_window=5,
     effects=[
         {"effect": "gravity"},
