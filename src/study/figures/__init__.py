@@ -1,4 +1,4 @@
-"""Figures of manuscript and report, one module for each subject.
+"""Figures of the paper and its supplement, one module for each subject.
 
-The modules import the plotting library only when they draw: planning a run imports them, too.
+Planning a run imports these modules, so they import the plotting library only when they draw.
 """

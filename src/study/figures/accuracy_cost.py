@@ -1,4 +1,4 @@
-"""Error and time of reductions and of alternatives to projective dynamics."""
+"""Figures of error against time per frame: reduced models, full-order model, coarser meshes."""
 
 import numpy as np
 import pandas as pd
@@ -16,10 +16,10 @@ from study.figures.kit.labels import Curve, label_curves
 from study.figures.kit.multiples import label_outer, rows_of, small_multiples, time_axis
 
 ERROR, TIME = "relative_error_within_horizon", "ms_per_frame"
-LOW, HIGH = 3e-3, 20.0  # limits of the error axis; larger and smaller errors are on the limits
+LOW, HIGH = 3e-3, 20.0  # limits of the error axis; errors outside are drawn on the limits
 MESH_ERROR = {"color": style.GREY, "linestyle": "-.", "linewidth": 1.0, "zorder": 0}
 SAMPLED = "ecsw"
-# Curve -> label; the first two are full-order models.
+# Curve -> label; the first two are curves of the full-order model.
 CURVES = {
     FOM: "fewer or more iterations",
     COARSER: "coarser mesh",
@@ -28,13 +28,13 @@ CURVES = {
     "gappy": words.method("gappy"),
     "block-deim": words.method("block-deim"),
 }
-HEIGHT = 2.3  # of the figure, inches
+HEIGHT = 2.3  # height of the figure, inches
 
 
 def curves(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Return the models of a scene by curve, as rows of ``table`` with a finite error and a time.
+    """Return curve -> rows of ``table`` with a finite error and a time, the fastest first.
 
-    Coarser meshes and sampled elements are the best settings, other curves all sizes by time.
+    Curves of coarser meshes and of sampled elements have the Pareto-optimal rows, others all rows.
     """
     table = table[(table[TIME] > 0.0) & np.isfinite(table[ERROR])]
     found = {}
@@ -53,14 +53,14 @@ def curves(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
     timed=True,
 )  # fmt: skip
 def accuracy_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """In this scene three elements per mode are faster than fewer iterations of the same error; at
-    larger errors reduced positions and coarser meshes are faster still. Position error on the
-    training trajectory, before the horizon and against the converged step, and time per frame.
-    Marks are basis sizes $r$ (interpolated projections), numbers of iterations $K$ (full-order
-    model), and the best combinations of modes and tolerance (reduced positions) or of mesh,
-    iterations and acceleration (coarser mesh). Dash-dotted, where it is known: the error of the
-    mesh itself. Further down and further left is better; errors outside the axis are drawn on its
-    limits.
+    """In this scene interpolation from three elements per mode is faster than full-order simulation
+    with fewer iterations and the same error; where larger errors are allowed, reduced positions and
+    coarser meshes are faster still. Each mark is a setting: its time per frame, and its position
+    error on the training trajectory up to the predictability horizon, relative to the converged
+    step. Settings are basis sizes $r$ (interpolated projections), numbers of iterations $K$ (black:
+    full-order model), and the best combinations of modes and tolerance (reduced positions) or of
+    mesh, iterations and acceleration (coarser mesh). A dash-dotted line is the discretisation error
+    of the mesh, where it is known. Errors outside the axis are drawn on its limits.
     """
     scene = drawn.scenes_of(held(table.dropna(subset=[ERROR, TIME])))[0]
     table = table[table.scene == scene]
@@ -83,14 +83,14 @@ def accuracy_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
 
 LEAST, MOST = 1e-4, 1.0  # limits of the error axis; errors outside are drawn on the limits
 BESIDE = 4  # largest number of panels in a row
-BEST = {"full-order model": style.BLACK, "the same on coarser meshes": style.ORANGE}
+BEST = {"full-order model": style.BLACK, "full-order, coarser meshes": style.ORANGE}
 DOT = (0.55, 0.55, 0.55)
 # Legend label -> (condition on the number of training trajectories of a reduction, colour).
 TRAINED = {
-    "reduced, one training trajectory": ("training_motions == 1", "#7FCFB4"),
+    "reduced, one trajectory": ("training_motions == 1", "#7FCFB4"),
     "reduced, several trajectories": ("training_motions > 1", style.GREEN),
 }
-BARE = "without the time of the vertices"
+BARE = "without vertex positions"
 
 
 @figure(
@@ -98,15 +98,15 @@ BARE = "without the time of the vertices"
     timed=True,
 )  # fmt: skip
 def alternatives(table: pd.DataFrame) -> Figure:
-    r"""On most meshes a full-order setting or a coarser mesh reaches the error of the reduced
-    models in less time. Position error over all frames of the first test trajectory, against the
-    converged step of the same mesh, and time per frame with the positions of all vertices, divided
-    by that of ten plain local/global iterations. Black: the best full-order settings (others: grey
-    dots); orange: on coarser meshes, whose displacement is interpolated. Green: the reduced model
-    (ECSW); dotted: without the time of the vertices. Dashed: replaying the training trajectory.
-    Dash-dotted: the error of the mesh itself, by Richardson's rule, where the observed order is .5
-    to 3. $\times 100$: weights a hundred times as large; *: some rows were recorded earlier or on
-    another machine. Errors outside the axis are drawn on its limits.
+    r"""On most meshes a full-order setting on this or a coarser mesh is as accurate as the reduced
+    models and faster. Position error over all frames of the first test trajectory, relative to the
+    converged step on the same mesh, against the time per frame, divided by the time of ten plain
+    local/global iterations. Black: best full-order settings (grey dots: all others). Orange: best
+    settings on coarser meshes, with interpolated displacements. Green: reduced positions (ECSW)
+    trained on one or several trajectories (dotted: without the time to compute vertex positions).
+    Dashed: replaying the training trajectory. Dash-dotted: discretisation error of the mesh, by
+    Richardson's rule, if the observed order is 0.5 to 3. $\times 100$: weights times 100. *: some
+    rows were recorded earlier or on another machine. Errors outside the axis are on its limits.
     """
     table = table[table.motion == FIRST]
     cases = table.groupby(["scene", "factor", "stiffness"])
@@ -120,8 +120,8 @@ def alternatives(table: pd.DataFrame) -> Figure:
     label_outer(axes, beside, "time / plain frame", y="position error")
     drawn = BEST | {label: colour for label, (_, colour) in TRAINED.items()}
     lines = [style.handle(BARE, color=style.GREEN, linestyle=":")]
-    lines.append(style.handle("replaying the training", color="#555555", linestyle="--"))
-    lines.append(style.handle("error of the mesh itself", **MESH_ERROR))
+    lines.append(style.handle("replaying the training trajectory", color="#555555", linestyle="--"))
+    lines.append(style.handle("discretisation error", **MESH_ERROR))
     looks = {label: (colour, "o") for label, colour in drawn.items()}
     style.legend(figure, [*style.handles(looks), *lines], 3)
     return figure
@@ -160,6 +160,6 @@ def _draw_best(ax: Axes, rows: pd.DataFrame, colour: str, line: str) -> None:
 
 
 def best_points(rows: pd.DataFrame, error: str, time: str = TIME) -> pd.DataFrame:
-    """Pareto-optimal ``rows`` with respect to columns ``time`` and ``error``, the fastest first."""
+    """Return the ``rows`` that are Pareto-optimal in ``time`` and ``error``, the fastest first."""
     best = pareto(rows[error].to_list(), rows[time].to_list())
     return rows[np.array(best, dtype=bool)].sort_values(time)

@@ -1,4 +1,4 @@
-"""Figures of the cost of a run: by phase and mesh size, and of reduced local steps."""
+"""Figures of computing time: by phase of a frame, by mesh size, and of reduced local steps."""
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ from study.experiments.kit.base import REST
 from study.figures.kit.declaration import GROUPS, MESHES, Drawn, figure, held, method_styles
 from study.figures.kit.multiples import label_outer, label_rows, plain_ticks, small_multiples
 
-# Phases of a frame: (label, colour). The first two form the local step, whose share is printed.
+# Phase of a frame -> label, colour. The first two phases are the local step.
 PHASES = {
     "local_ms": ("local step: projections", style.ORANGE),
     "assembly_ms": ("local step: right-hand side", "#F7D08A"),
@@ -19,16 +19,16 @@ PHASES = {
     REST: (REST, "#C9C4BA"),
 }
 TITLES = {"interpreted": "interpreted loop", "numpy": "vectorised NumPy", "compiled": "compiled"}
-CLAIM = 70.0  # per cent of the time of a frame in the local step, by claim C1 of the preprint
+CLAIM = 70.0  # per cent of a frame that the local step takes, by claim C1 of the preprint
 CURVES = {
     "ms_per_iteration": ("complete iteration", "-"),
     "local_ms": ("local step", "--"),
     "global_ms": ("global solve", ":"),
     "vertices_ms": ("positions of all vertices", "-."),
 }
-# Methods beside whose curves stands p of the fit time ~ (number of vertices)^p.
+# Methods whose curves are labelled with the exponent p of the fit time ~ (number of vertices)^p.
 FITTED = ("fom", "ecsw")
-ROOM = 2.6  # the axis ends at this multiple of the largest mesh size, to leave space for text
+ROOM = 2.6  # the axis ends at this multiple of the largest mesh size, to leave space for labels
 COLUMNS = 3  # panels in a row of figure `break_even`
 
 
@@ -37,12 +37,12 @@ COLUMNS = 3  # panels in a row of figure `break_even`
     scenes=f"cloth_all spring_oop strain_oop bar_release {MESHES}", timed=True,
 )  # fmt: skip
 def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """The local step takes most of a frame if it is interpreted; in compiled code it does so only
-    where a projection is expensive. Shares of the time of a full-order frame for three
-    implementations of the same local step. The printed percentage is the share of the local step
-    (both shades of orange: the projections, and the right-hand side that is assembled from them, in
-    one pass where they are compiled). Grey is the rest of the frame, such as the prediction and
-    contacts. The dashed line is the 70 % of claim C1; beside each bar stands the time per frame.
+    """The local step takes nearly all of a frame in interpreted code; in compiled code its share
+    exceeds the 70 % of the preprint's claim C1 (dashed line) only where a projection is expensive.
+    Shares of the time of a full-order frame for three implementations of the same local step. The
+    printed percentage is the share of the local step (orange: projections; light orange: assembly
+    of the right-hand side from them; compiled code does these in one pass). Grey is the rest of the
+    frame, for example prediction and contacts. To the right of each bar is the time per frame.
     """
     scenes = drawn.scenes_of(table)
     present = set(table[table.scene.isin(scenes)].implementation)
@@ -80,14 +80,14 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
 
 
 @figure(
-    title="Cost against mesh size", reads={"table": TableOf("scaling")},
+    title="Time of an iteration against mesh size", reads={"table": TableOf("scaling")},
     scenes=f"strain_oop spring_oop bar_release {MESHES}", timed=True,
 )  # fmt: skip
 def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """The time of a full-order iteration grows with the mesh, that of the reduced model hardly.
-    Time of one local/global iteration against the number of vertices, and of its parts; the
-    positions of all vertices are a separate line. Beside the curves stands the exponent of a fitted
-    power law, where there are three mesh sizes or more.
+    """The time of a full-order iteration grows with the mesh much faster than the time of an
+    iteration with reduced positions. Time of one local/global iteration (solid) and of its parts
+    (other lines) against the number $N$ of vertices. Labels at the ends of curves are fitted power
+    laws, for scenes with three mesh sizes or more.
     """
     scenes = drawn.scenes_of(table)
     figure, looks = style.new_figure(2.9), method_styles({*table.method})
@@ -125,15 +125,15 @@ def _draw_times(ax: Axes, rows: pd.DataFrame, looks: dict[str, tuple[str, str]])
 
 
 @figure(
-    title="Reduced against full local step", reads={"table": TableOf("breakeven")},
+    title="Cost of the reduced local step", reads={"table": TableOf("breakeven")},
     methods="deim deim-joint block-deim gappy", timed=True,
 )  # fmt: skip
 def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """A reduced local step is faster than the full one up to a basis size that depends on the cost
-    of a projection. Time of the reduced local step divided by that of the full one, both compiled
-    and on one thread, against the number $r$ of basis vectors; one line per scene and method, timed
-    separately from the rest of a frame on states of the full-order simulation. Above the dashed
-    line the reduction is slower. Lines end at the numerical rank.
+    """A reduced local step is faster than the full local step up to a basis size that depends on
+    the cost of a projection. Time of the reduced local step divided by the time of the full local
+    step (both compiled, on one thread) against the number $r$ of basis vectors. Panels are kinds of
+    constraints, lines scenes and methods. Only the local step is timed, on full-order states. Above
+    the dashed line the reduced step is slower. Lines end at the numerical rank of the snapshots.
     """
     table = held(drawn.rows(table).query("factor == 1.0"))
     groups = [group for group in GROUPS if (table.group == group).any()]

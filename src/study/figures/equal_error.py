@@ -1,4 +1,4 @@
-"""Figure of the speed-ups of reduced models over full-order settings of equal error."""
+"""Figure of speed-ups of reduced models over full-order settings that are as accurate."""
 
 import numpy as np
 import pandas as pd
@@ -12,16 +12,16 @@ from study.figures.kit.declaration import figure, held
 from study.figures.kit.labels import Curve, label_curves
 from study.figures.kit.multiples import plain_ticks
 
-MESH = ["vertices", "scene", "factor", "stiffness"]  # columns that name a mesh, by its size
-AGAINST = {"same": "solvers on the same mesh", "coarser": "coarser meshes allowed"}
+MESH = ["vertices", "scene", "factor", "stiffness"]  # columns that identify a mesh, by its size
+AGAINST = {"same": "full-order model on the same mesh", "coarser": "also on coarser meshes"}
 LOOKS = {
     "springs": (style.VERMILLION, "^"), "triangles": (style.BLUE, "s"),
     "tetrahedra": (style.GREEN, "o"),
 }  # fmt: skip
-WRONG = 0.1  # position error above which a mark is hollow
-APART, BESIDE = 1.045, 1.17  # ratios of x of neighbouring marks of a mesh, and of meshes
-LARGE = 0.5  # the errors are printed of meshes with more than this share of the most vertices
-HEIGHT = 2.6  # of the figure, inches
+WRONG = 0.1  # marks of larger position errors are hollow
+APART, BESIDE = 1.045, 1.17  # ratios of x between neighbouring marks of a mesh, and between meshes
+LARGE = 0.5  # errors are printed for meshes with more than this share of the most vertices
+HEIGHT = 2.6  # height of the figure, inches
 
 
 @figure(
@@ -29,15 +29,15 @@ HEIGHT = 2.6  # of the figure, inches
     timed=True,
 )  # fmt: skip
 def equal_error(table: pd.DataFrame) -> Figure:
-    """Reduced positions with sampled elements are faster than solvers on the same large mesh; if
-    coarser meshes are allowed, they stay ahead on all test trajectories of one bar only. Time of
-    the fastest full-order setting whose position error is at most as large, divided by the time of
-    the reduced model (POD subspace, ECSW, five iterations, two training trajectories; training not
-    included). Each mesh has a mark for each of the three test trajectories, from left to right,
-    with the position errors of the reduced model beside the large meshes; the mark is hollow where
-    the error exceeds 10 %. Vertical lines are bootstrap intervals over processes. Arrow: no
-    full-order setting is as accurate (lower bound); cross: the converged step is not accurate
-    enough to judge; *: some rows were recorded earlier or on another machine.
+    """On large meshes reduced positions with sampled elements are mostly faster than the full-order
+    model on the same mesh. If the full-order model may use coarser meshes, they are faster on all
+    test trajectories of one bar only. Speed-up: time of the fastest full-order setting with at most
+    the position error of the reduced model, divided by the time of this model (POD subspace, ECSW,
+    five iterations, two training trajectories; without training). Each mesh has three marks, one
+    for each test trajectory; labels of large meshes give the errors of the model in this order.
+    Marks are hollow for errors above 10 %. Vertical lines: bootstrap intervals over processes.
+    Arrow: no full-order setting is as accurate (lower bound). Cross: the converged step is not
+    accurate enough to judge. *: some rows were recorded earlier or on another machine.
     """
     table = table[table.iterations.notna() & (table.stiffness == 1.0)]
     table = held(table.dropna(subset=[f"{name}_speedup" for name in AGAINST]).sort_values(MESH))
@@ -61,7 +61,7 @@ def equal_error(table: pd.DataFrame) -> Figure:
 
 
 def _draw(ax: Axes, table: pd.DataFrame, against: str) -> list[Curve]:
-    """Draw the marks of all meshes against one kind of settings, and return their labels."""
+    """Draw the speed-ups of all meshes over the settings ``against``; return their labels."""
     labelled = list[Curve]()
     for size, meshes in table.groupby("vertices"):
         for place, (_, rows) in enumerate(meshes.groupby(MESH)):
@@ -76,14 +76,14 @@ def _draw(ax: Axes, table: pd.DataFrame, against: str) -> list[Curve]:
             if size > LARGE * table.vertices.max():
                 text += f": {errors} %"
             elif first.elements != "tetrahedra":
-                text = ""  # the colour tells the small sheets apart
+                text = ""  # the colour identifies the small sheets
             points = np.stack([x, rows[f"{against}_speedup"]], axis=1)
             labelled.append((text, LOOKS[first.elements][0], points))
     return labelled[::-1]  # large meshes first
 
 
 def _draw_mark(ax: Axes, x: float, row: pd.Series, against: str) -> None:
-    """Draw one trajectory at ``x``: speed-up, interval, an arrow if it is a lower bound."""
+    """Draw the speed-up on one trajectory at ``x``: mark, interval, arrow if a lower bound."""
     speedup, low, high = (row[f"{against}_speedup{end}"] for end in ("", "_low", "_high"))
     if not row.known:
         ax.plot(x, speedup, "x", color=style.GREY, markersize=3.5)

@@ -1,4 +1,4 @@
-"""Figure of the error budget: the parts of the error of reduced models on test trajectories."""
+"""Figure of the error budget: parts of the error of reduced models on test trajectories."""
 
 import pandas as pd
 
@@ -14,8 +14,8 @@ LOW, HIGH = 1e-3, 3.0  # limits of the error axis; errors outside are drawn on t
 PARTS = {
     "span": ("span: best approximation in the subspace", "#5A5A5A", "|"),
     "closure": ("closure: converged reduced step", style.PURPLE, "o"),
-    "sampling": ("sampling: the same with sampled elements", "#332288", "s"),
-    "run": ("iterations: the same with five iterations", style.GREEN, ">"),
+    "sampling": ("sampling: also with sampled elements", "#332288", "s"),
+    "run": ("iterations: also with five iterations only", style.GREEN, ">"),
     "full_order": ("full-order model with ten iterations", style.BLACK, "x"),
 }
 ROW = 0.14  # height of a row, inches
@@ -25,12 +25,12 @@ RING = {"markersize": 7.0, "markerfacecolor": "none"}  # the closure, around the
 
 @figure(title="Where the error of a reduced model arises", reads={"table": TableOf("error_budget")})
 def error_budget(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """The restriction of the equations to the subspace (Galerkin closure) and the five iterations
-    add most of the error; the sampling adds little. Deformation error against the converged step,
-    before the horizon: medians of the three test trajectories of each scene, for 40 POD modes. From
-    mark to mark one simplification is added: the subspace, the equations restricted to it, the
-    sampled elements, five iterations. The cross is the full-order model, which has none of them.
-    The dashed line is an error of 10 %; errors outside the axis are drawn on its limits.
+    """Restricting the equations to the subspace (Galerkin closure) and stopping after five
+    iterations add most of the error; sampling adds little. Deformation error of the reduced
+    model (40 POD modes) relative to the converged step, up to the predictability horizon: medians
+    over three test trajectories of each scene. Each mark adds one simplification: the subspace, the
+    restricted equations, sampled elements, five iterations. Cross: full-order model. The dashed
+    line is an error of 10 %; errors outside the axis are drawn on its limits.
     """
     table = table[table.skinning == 0]
     scenes = drawn.scenes_of(table)

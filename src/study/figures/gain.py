@@ -1,6 +1,6 @@
-"""Figures of errors against DEIM constant, method and basis size; figure of singular values.
+"""Figures of errors by DEIM constant, method and basis size, and of singular values.
 
-Columns named gain hold the DEIM constant, by which sampling may amplify errors.
+Columns `gain` have the DEIM constant: the norm that bounds how much interpolation amplifies errors.
 """
 
 from itertools import cycle
@@ -18,10 +18,10 @@ from study.figures.kit.declaration import GROUPS, MESHES, Drawn, Experiment, fig
 from study.figures.kit.multiples import label_outer, label_rows, small_multiples
 from study.tables.kit.results import FAILED, judged_runs
 
-GAINS = (1.0, 1e5)  # limits of the axis of constants; points outside are drawn on the limits
+GAINS = (1.0, 1e5)  # limits of the axis of DEIM constants; points outside are on the limits
 ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-3, 30.0)
 ENDS = ("low", "median", "high")
-DECADES = 4  # bars, one for each decade of the constant from 1 on; one more bar: all larger ones
+DECADES = 4  # one bar per decade of the constant from 1 on, and a last bar for all larger constants
 _KEYS = ["scene", "group", "method", "r"]
 
 
@@ -33,11 +33,12 @@ _KEYS = ["scene", "group", "method", "r"]
     },
 )  # fmt: skip
 def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
-    """Most simulations with a large DEIM constant fail, and few with a small one. Left: every
-    simulation by a sampled method whose basis suffices (the orthogonal projection of the same size
-    does not fail). Above the dashed line a simulation counts as failed; arrows lie outside the
-    axes. Crosses are ranges and medians over simulations that are trained on as many resampled
-    frames. Right: share of failing simulations by decade of the constant.
+    """Most simulations with a large DEIM constant fail, few with a small DEIM constant do. This
+    constant bounds how much interpolation amplifies errors. Left: position error up to the
+    predictability horizon, relative to the full-order simulation; one mark per simulation with
+    interpolated projections whose basis suffices (orthogonal projection onto it does not fail).
+    Simulations above the dashed line failed; arrows point to values outside the axes. Crosses:
+    range and median if training frames are drawn at random. Right: share of failed simulations.
     """
     runs = drawn.rows(judged_runs(tables["reruns"], tables["errors"]))
     figure = style.new_figure(3.0)
@@ -65,7 +66,7 @@ def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
 def _draw_method(
     ax: Axes, runs: pd.DataFrame, ranges: pd.DataFrame, colour: str, marker: str
 ) -> None:
-    """Draw a dot (gain, error) per run; crosses span both over repetitions (``ranges``)."""
+    """Draw a mark (DEIM constant, error) per run, and crosses for ``ranges`` over repetitions."""
     x, y = runs.gain.to_numpy(float), runs.error.to_numpy(float)
     outside = {4: x < GAINS[0], 5: x > GAINS[1], 6: y > ERRORS[1], 7: y < ERRORS[0]}
     x, y = np.clip(x, *GAINS), np.clip(y, *ERRORS)
@@ -82,8 +83,8 @@ def _draw_method(
 
 
 def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
-    """Draw for each decade of the constant: per cent of failed runs, number of runs."""
-    # the last bar has all larger constants, including infinite ones
+    """Draw a bar for each decade of the constant: per cent of failed runs, number of runs."""
+    # the last bar counts all larger constants, including infinite ones
     upper = np.ceil(np.log10(runs.gain.clip(upper=10.0**DECADES + 1.0))).clip(lower=1)
     decades = runs.groupby(upper.astype(int)).failed.agg(["size", "mean"])
     places = np.arange(len(decades))
@@ -95,17 +96,17 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     ax.set_xticks(places, list(spans.values()))
     ax.set(ylim=(0, 112), yticks=[0, 25, 50, 75, 100])
     ax.tick_params(axis="x", labelrotation=35)
-    ax.set(xlabel="DEIM constant", ylabel="failing simulations (%)")
-    ax.set_title("numbers: simulations")
+    ax.set(xlabel="DEIM constant", ylabel="failed simulations (%)")
+    ax.set_title("above bars: simulations")
     ax.grid(True)
 
 
-# Step of the ladder -> words; each step keeps what the steps before it have changed.
+# Ablation step in the table `ladder` -> row label; each step keeps all earlier changes.
 STEPS = {
     "published code": "preprint's code",
     "+ affine centring": "snapshots less their mean",
     "+ shared coefficients": "one system for all coordinates",
-    "+ whole elements": "elements instead of rows",
+    "+ whole elements": "element-wise sampling",
     "+ three elements a mode (sound)": "three elements per mode",
     "and a gain of at most 2": "DEIM constant of at most 2",
 }
@@ -113,18 +114,18 @@ THICK = 2  # number of scenes with thick lines and printed DEIM constants
 
 
 @figure(
-    title="One change after the other", reads={"table": TableOf("ladder")},
+    title="Ablation: one change after another", reads={"table": TableOf("ladder")},
     scenes="bar_release spring_oop bar_twist strain_oop spring_twist_twin strain_twist_twin "
     f"bend_curved {MESHES}",
 )  # fmt: skip
 def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """One system for all coordinates and three elements per mode lower the error most. Position
-    error of reduced simulations of the training trajectory, before the horizon and against the
-    full-order simulation; one line per scene. From row to row one ingredient is changed, beginning
-    with the choices of the preprint's code, and all earlier changes are kept. Simulations that blew
-    up are on the right limit. Thin horizontal lines are ranges over simulations that are trained on
-    as many resampled frames. The numbers on the right are the DEIM constants of the scenes with
-    thick lines.
+    """One system for all coordinates and three elements per mode reduce the error most. Position
+    error of reduced simulations of the training trajectory, relative to the full-order simulation
+    and up to the predictability horizon; one line per scene. The first row has the choices of the
+    preprint's code; each further row changes one choice and keeps all earlier changes. Simulations
+    that blew up are drawn on the right limit. Thin horizontal lines: ranges over simulations with
+    randomly drawn training frames. Numbers on the right: DEIM constants (bounds on the
+    amplification of errors by interpolation) of the scenes with thick lines.
     """
     table = held(table[table.scene.isin(drawn.scenes) & table.gain.notna()])
     table = held(table[table.direction.isin(["up", "down"])])
@@ -163,7 +164,7 @@ SHOWN = (1e-7, 1e3)  # limits of the error axis; errors outside are drawn on the
 SPLITS = {"train": ("training", "-"), "test": ("frames between", "--"), "heldout": ("test 1", ":")}
 PUBLISHED = "#B5B5B5"
 PUBLISHED_CODE = "config/reference/published_code"
-# Scene -> similar experiment of the published code, which is drawn beside it.
+# Scene -> most similar experiment of the published code, whose output is drawn in its panel.
 BESIDE = {"cloth_all": "all_three", "bend_fall": "bending_only", "bar_release": "bar"}
 REGION = "#F1EFEB"
 HOLLOW = {"markerfacecolor": "white", "markeredgecolor": "#777777"}
@@ -173,7 +174,7 @@ Panel = tuple[Axes, Experiment, pd.DataFrame]
 def _panels(
     drawn: Drawn, table: pd.DataFrame, limits: tuple[float, float], columns: int, legend: int
 ) -> tuple[Figure, list[Panel]]:
-    """Figure with a panel for each scene and group in ``table``, and ``legend`` lines below."""
+    """Return a figure, ``legend`` lines below, and a panel per scene and group in ``table``."""
     rows = dict([*held(table[table.scene.isin(drawn.scenes)]).groupby(["scene", "group"])])
     shown = [each for each in drawn.experiments if (each.scene, each.group) in rows]
     figure, axes = small_multiples(len(shown), columns, legend_rows=legend)
@@ -185,7 +186,7 @@ def _panels(
 
 
 def _published(path: Path, columns: list[str], each: Experiment) -> pd.DataFrame:
-    """Output of the preprint's own code in ``path`` for the experiment most like ``each``."""
+    """Read the output of the preprint's code in ``path`` for the experiment most like ``each``."""
     output = read_table(path, ["experiment", "group", *columns], result=False)
     name = BESIDE.get(each.scene)
     return output[(output.experiment == name) & (output.group == each.group)]
@@ -201,10 +202,9 @@ def _published(path: Path, columns: list[str], each: Experiment) -> pd.DataFrame
     f"strain_stretch strain_twist strain_poke strain_oop bar_release bar_twist {MESHES}",
 )  # fmt: skip
 def singular_values(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
-    """The singular values of the training snapshots decay, unless the projections are rounding
-    errors. Values relative to the first; hollow marks lie below the rounding errors of the
-    projections and are noise. Grey lines are the output of the preprint's code for the most similar
-    scene.
+    """The singular values of the training snapshots decay, except where the projections consist of
+    rounding errors. Values are divided by the first; hollow marks lie below the rounding errors of
+    the projections and are noise. Grey: output of the preprint's code for its most similar scene.
     """
     figure, panels = _panels(drawn, table, VALUES, 4, legend=2)
     reference = False
@@ -220,13 +220,13 @@ def singular_values(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figur
     handles = style.handles({style.words(e.group): GROUPS[e.group] for _, e, _ in panels})
     handles.append(style.handle("below rounding errors", linestyle="none", marker="o", **HOLLOW))
     if reference:
-        handles.append(style.handle("preprint's code", color=PUBLISHED))
+        handles.append(style.handle("preprint's output", color=PUBLISHED))
     style.legend(figure, handles, 4)
     return figure
 
 
 def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None:
-    """Draw singular values; those below round-off have hollow markers in a shaded region."""
+    """Draw singular values; those below rounding errors are hollow, in a shaded region."""
     component = rows.component.to_numpy(float)
     above = rows.above_roundoff.astype(bool).to_numpy()
     # zeros cannot be drawn on a logarithmic axis and are raised to its lower limit
@@ -254,11 +254,11 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
     methods="pod deim deim-joint published block-deim",
 )  # fmt: skip
 def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
-    """The reconstruction error of the preprint's variants stays high, while one system for all
-    coordinates follows the orthogonal projection on training frames. Relative error of
-    reconstructed projections against the number $r$ of basis vectors, for the frames used in
-    training, the frames between them, and the first test trajectory. Errors above the axis are
-    drawn on its limit with an arrow head.
+    """On training frames, methods with one system for all coordinates (entry-wise and element-wise
+    DEIM) are nearly as accurate as the orthogonal projection; the preprint's are less accurate.
+    Relative error of projections reconstructed from samples against the number $r$ of basis
+    vectors: for training frames, for the frames between them, and for the first test trajectory.
+    Grey: output of the preprint's code for a similar scene. Arrow heads: errors above the axis.
     """
     styles = drawn.styles(table)
     figure, panels = _panels(drawn, table, SHOWN, 3, legend=3)
@@ -281,14 +281,14 @@ def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> 
     handles = drawn.handles(styles)
     handles += [style.handle(text, color="#555555", linestyle=s) for text, s in SPLITS.values()]
     if reference:
-        label = "preprint's code (x, y)"
+        label = "preprint's output (x, y)"
         handles.append(style.handle(label, color=PUBLISHED, linewidth=1.0))
     style.legend(figure, handles, 3)
     return figure
 
 
 def _draw_errors(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> bool:
-    """Draw errors of a method, as arrows if too large for the axis; return if any is finite."""
+    """Draw errors of a method, arrows for errors above the axis; return if any is finite."""
     drawn = False
     for split, (_, dashes) in SPLITS.items():
         line = rows[rows.split == split].sort_values("r")

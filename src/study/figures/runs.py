@@ -1,4 +1,4 @@
-"""Figures that show reduced runs beside full-order runs, for the scenes of the preprint."""
+"""Pictures of reduced runs and full-order runs in the scenes of the preprint."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -29,8 +29,8 @@ from study.tables.errors import VOLUMES
 
 NOISY = {"all": "all axes", "plane": "in the plane", "vertex": "plane and one vertex"}
 NOTHING_RAN = "not run: the projections are rounding errors, there is nothing to reduce"
-WRONG = 0.1  # a run has failed if its relative error exceeds this, or if it blew up
-DISTANCES = (1e-4, 1.0)  # limits of colours: distance from full order / longest side of mesh
+WRONG = 0.1  # a run fails if its relative error exceeds this value, or if it blows up
+DISTANCES = (1e-4, 1.0)  # limits of colours: distance to full-order run / longest side of mesh
 FOOTER = 0.55  # height of the colour scale, inches
 # Figure `teaser`: instant as a fraction of the run, number of modes r, limit of k, and tolerance.
 INSTANT, MODES, TOLERANCE = 0.65, 20, "ecsw-1e-02"
@@ -45,16 +45,16 @@ RUNS: dict[str, Read] = {
     "reruns": EachOf(RERUNS, "drawn.runs"),
     **FLOORS,
 }
-COMPARED = """with one system per coordinate (preprint's selection) most simulations are distorted
-or blow up; element-wise DEIM is better. The full-order model and reduced projections in one frame
-of the training trajectory, by basis size; the grey outline is the full-order model. A framed
-picture is drawn to the smaller scale given below it.
+COMPARED = """separate systems for x, y, z (preprint's selection) distort most simulations or make
+them blow up; element-wise DEIM is closer to the full-order model. Pictures show the full-order
+model and simulations with reduced projections, by basis size $r$, in one frame of the training
+trajectory. Grey outline: full-order model. Red frame: drawn to the smaller scale given below.
 """
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A scene at one frame, with what is needed to draw runs at this frame.
+    """Scene in one frame, with everything that is needed to draw runs in this frame.
 
     when : text with the number of the frame
     full : (1, N, 3) positions of the full-order run, m
@@ -74,9 +74,9 @@ class Shown:
     def row(self, label: str, panels: list[RunPanel], seen: list[RunPanel]) -> Row:
         """Return a row of pictures: the full-order run, then ``panels``.
 
-        The title of the row is that of the experiment, with ``label`` below. The pictures show what
-        contains the full-order run and the panels ``seen``. If none of these runs could start, as
-        each basis size exceeds the rank, a note says so in place of empty panels.
+        The row has the title of the experiment, with ``label`` below. Its window contains the
+        full-order run and the panels ``seen``. If none of these runs could start, because each
+        basis size exceeds the rank, a note replaces the panels.
         """
         note = None
         if not any(panel.began for panel in seen):
@@ -91,7 +91,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Runs:
-    """Inputs of figures of runs: a file per scene; in ``reruns`` per scene, group and method."""
+    """Inputs of pictures of runs: files per scene; ``reruns``: per scene, group and method."""
 
     drawn: Drawn
     horizon: Horizon
@@ -104,7 +104,7 @@ class Runs:
 
     @cached_property
     def ends(self) -> dict[str, int | None]:
-        """Horizon of each scene; None if it lies beyond the run."""
+        """Horizon of each scene; None if the scene is predictable to its last frame."""
         floors = floors_of(self.sensitivity, self.horizon)
         return {scene: end for scene, (_, end) in floors.items()}
 
@@ -124,7 +124,7 @@ class Runs:
         )
 
     def reduced(self, shown: Shown) -> dict[str, list[RunPanel]]:
-        """Return method -> panels of its reduced runs, for the basis sizes `ranks`."""
+        """Return method -> panels of its reduced runs, one for each basis size in `ranks`."""
         found = {}
         for method in self.drawn.methods:
             path = shown.experiment.find(self.reruns, method=method)
@@ -149,19 +149,19 @@ class Runs:
 
 
 def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | None:
-    """Meshes of obstacles near ``positions`` (F, N, 3) m; None for a floor only (a shadow)."""
+    """Return obstacles near ``positions`` (F, N, 3) m; None if only a floor (drawn as shadow)."""
     bodies = obstacles(positions, experiment.effects)
     floor = any(effect.effect == "floor" for effect in experiment.effects)
     return None if floor and len(bodies) == 1 else bodies
 
 
 @figure(
-    title="The bar, reduced", more=COMPARED, reads=RUNS,
+    title="Bars with reduced projections", more=COMPARED, reads=RUNS,
     scenes="bar_release bar_twist torus_release starfish_twist", methods=PAIR,
     groups=" ".join(VOLUMES),
 )  # fmt: skip
 def bar_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Bars of tetrahedra:"""
+    """In bars of tetrahedra,"""
     return Runs(drawn, horizon, RANKS, (0.65,), **files).draw()
 
 
@@ -170,7 +170,7 @@ def bar_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     scenes="spring_stretch spring_twist ball_shell", methods=PAIR, groups="spring",
 )  # fmt: skip
 def spring_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Sheets with springs only:"""
+    """In sheets with springs only,"""
     return Runs(drawn, horizon, RANKS, (0.3,), **files).draw()
 
 
@@ -180,7 +180,7 @@ def spring_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     groups="strain area",
 )  # fmt: skip
 def strain_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Sheets with strain on triangles only:"""
+    """In sheets with strain on triangles only,"""
     return Runs(drawn, horizon, RANKS, (0.3,), **files).draw()
 
 
@@ -190,12 +190,12 @@ def strain_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     scenes="bend_fall bend_poke bend_curved", methods=PAIR, groups="bending",
 )  # fmt: skip
 def bending_runs(drawn: Drawn, horizon: Horizon, noise: pd.DataFrame, **files: Files) -> Figure:
-    """The projections of a flat sheet are rounding errors, so that a basis of them is noise: in the
-    preprint's two scenes a reduced simulation survives or fails by the coordinates that the initial
-    rounding errors reach. The curved sheet has projections that matter. Sheets with bending only,
-    near the end of the simulation: the full-order model and reduced projections by basis size.
-    Drawn is the first perturbed start for which some sizes run and others do not, or else the
-    first; below each picture stands the number of failing starts.
+    """The projections of the preprint's two flat sheets are rounding errors, so that a basis of
+    them is noise: the perturbed coordinates of the initial positions decide if a reduced simulation
+    fails. The projections of the curved sheet are not noise. Pictures show sheets with bending only
+    in one frame: the full-order model, then simulations with reduced projections by basis size $r$.
+    Of the perturbed starts, the first is drawn for which some sizes fail and others do not (else
+    the first of all); the number of starts that fail is below each picture.
     """
     noise_runs = files.pop("noise_runs")
     runs, rows = Runs(drawn, horizon, RANKS, (0.6,), **files), []
@@ -211,8 +211,8 @@ def bending_runs(drawn: Drawn, horizon: Horizon, noise: pd.DataFrame, **files: F
 def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> list[Row]:
     """Return a row of pictures for each method and kind of perturbed start (keys of `NOISY`).
 
-    Below a picture stands how many starts of the kind led to failed runs. Kinds for which these
-    numbers agree at every basis size share a row, with pictures of the first of these kinds.
+    The text below a picture counts the starts of this kind whose runs failed. Kinds with the same
+    counts at every basis size share a row, with pictures of the first of these kinds.
     """
     shown, rows = replace(shown, bodies=None), []
     table = table[table.r <= table["rank"]]
@@ -241,11 +241,11 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
     methods=PAIR, several=True,
 )  # fmt: skip
 def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
-    """Reducing strain changes little in this scene, whatever the method, since springs carry nearly
-    all of the force. The cloth with bending, springs and strain in frames up to its horizon: the
-    full-order model, then simulations with the projections of one group reduced by two methods.
-    Colours are distances to the full-order model, whose outline is grey; a framed picture is drawn
-    to the smaller scale given below it.
+    """Reducing the strain changes this simulation little, since springs carry nearly all of the
+    force. Pictures show a cloth with bending, springs and strain in frames up to its predictability
+    horizon: the full-order model, then simulations with reduced projections of one constraint group
+    by two methods. Colours are distances to the full-order model, whose outline is grey. Red frame:
+    drawn to the smaller scale given below.
     """
     # instants as fractions of the horizon
     runs = Runs(drawn, horizon, (20, 10, "full"), (0.5, 0.75, 1.0), **files)
@@ -286,7 +286,7 @@ def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
 def _over_time(
     path: str, runs: Runs, title: str, frames: list[int], full: np.ndarray, mesh: Mesh
 ) -> list[RunPanel] | None:
-    """Panels of a reduced run at ``frames``, coloured by the distance to the full-order run.
+    """Return panels of a reduced run at ``frames``, coloured by distance to the full-order run.
 
     ``full`` : (F, N, 3) m, full-order positions. Returns None if all sizes r exceed the rank.
     """
@@ -322,13 +322,13 @@ def _colours() -> ScalarMappable:
     }, scenes="bar_release spring_oop", methods="published gappy", timed=True,
 )  # fmt: skip
 def teaser(drawn: Drawn, table: pd.DataFrame, **files: Files) -> Figure:
-    """The preprint's method fails on a test trajectory, on which it was not trained. Two other
+    """On a test trajectory, which was not used for training, the preprint's method fails; two other
     reduced models stay close to the full-order model. Each row shows one frame of a scene. Below a
-    picture: relative position error against the full-order model, until the time up to which the
-    scene can be predicted (figure 2), and time per frame. Column 2: projections with $r$ modes,
-    chosen as in the preprint's code. Column 3: the same with three elements per mode and one
-    interpolation for all coordinates. Column 4: positions by $k$ modes, with sampled elements
-    (ECSW). Outlines show the full-order model; what lies far outside of them is cut off.
+    picture: position error relative to the full-order model up to the predictability horizon (until
+    then tiny perturbations have no effect), and time per frame. Column 2: projections interpolated
+    with $r$ modes as in the preprint's code. Column 3: projections interpolated with $r$ modes from
+    three elements per mode, by one system for all coordinates. Column 4: positions in a subspace of
+    $k$ modes, with sampled elements (ECSW). Outlines: full-order model; distant parts are cut off.
     """
     rows = [_teaser_row(drawn, each, table, files) for each in drawn.experiments]
     return view.draw_rows(rows, height_limit=TEASER_ROW * len(rows))
@@ -371,7 +371,7 @@ def _teaser_row(
 
 
 def _with_numbers(panel: RunPanel, title: str, rows: pd.DataFrame) -> RunPanel:
-    """Return ``panel`` with ``title``; below it, error and time of a model in ``rows``."""
+    """Return ``panel`` with ``title``, and the error and time of a model from ``rows`` below."""
     error = rows.relative_error_within_horizon[rows.motion == FIRST].dropna()
     look = {"precision": 2, "fractional": False, "trim": "-"}
     texts = [f"error {np.format_float_positional(100.0 * e, **look)} %" for e in error[:1]]
@@ -381,15 +381,15 @@ def _with_numbers(panel: RunPanel, title: str, rows: pd.DataFrame) -> RunPanel:
 
 
 def _milliseconds(times: pd.Series) -> str | None:
-    """Median of ``times`` in ms with its unit; None if all are missing."""
+    """Format the median of ``times`` in ms with its unit; None if all are missing."""
     return f"{times.median():.2g} ms" if times.notna().any() else None
 
 
 def _subspace(frame: int, path: str) -> Iterator[tuple[int, np.ndarray | None]]:
     """Yield the number of modes of the largest position subspace up to `MODES`, and positions.
 
-    The positions (N, 3) m are None if the run on the test trajectory ended before ``frame``.
-    Nothing is yielded without such a subspace.
+    The positions (N, 3) m are None if the run on the test trajectory diverged before ``frame``.
+    Yields nothing without a subspace.
     """
     with open_hdf5(path) as file:
         models = file["models"]

@@ -1,4 +1,4 @@
-"""Figures on the mesh: snapshots and modes, iterations of DEIM, elements that are sampled."""
+"""Figures drawn on the mesh: snapshots and modes, iterations of DEIM, sampled elements."""
 
 from dataclasses import dataclass
 
@@ -24,18 +24,18 @@ from study.figures.kit.read import positions_at, read_samplings
 
 EARLIER = {"mfc": "#FFFFFF", "mec": style.BLACK, "markeredgewidth": 0.8, "markersize": 3.0}
 NEWEST = {"mfc": "none", "mec": style.SKY, "markeredgewidth": 1.6, "markersize": 8.5}
-SEVERAL = "several"  # stands for x, y or z if entries of several axes of an element are sampled
+SEVERAL = "several"  # in place of x, y or z if entries of several axes of an element are sampled
 AXES = {"x": style.VERMILLION, "y": style.GREEN, "z": style.BLUE, SEVERAL: "#333333"}
 SCENES = f"strain_oop strain_twist_twin spring_stretch bar_release {MESHES}"
 STEPS, COLUMNS = 6, 3  # selection steps of figure `deim_iterations`, and panels in a row
-ENTRIES = 20  # basis size of figure `deim_entries`; the largest one where there is none
-INSTANTS, MODES = (0.15, 0.5, 0.85), 4  # snapshots of a run, as fractions of it, and modes
+ENTRIES = 20  # basis size in figure `deim_entries`; the largest size where there is no such basis
+INSTANTS, MODES = (0.15, 0.5, 0.85), 4  # instants as fractions of a run; number of modes
 ROW_HEIGHT = 1.85  # height of a row of panels, inches
 
 
 @dataclass(frozen=True)
 class Iteration:
-    """Step k of DEIM.
+    """Step k of DEIM on a basis.
 
     magnitude : (e,) largest absolute entry of mode k's residual on each element
     earlier, newest : indices of the elements with the entries chosen in earlier steps, in this step
@@ -60,10 +60,10 @@ def deim_iterations(
     drawn: Drawn, meshes: list[File], bases: list[File], samples: list[File]
 ) -> Figure:
     """Each step of DEIM selects one entry, although the projection of a complete element has to be
-    computed for it. In step $k$ the mode $k$ is interpolated by the modes before it at the entries
-    selected so far; the entry with the largest absolute residual is selected next. The colour of an
-    element is the largest residual among its entries; the ring marks the selected element, white
-    dots those of earlier steps.
+    computed for this entry. Step $k$ interpolates mode $k$ by the modes before it at the entries
+    selected so far, and selects the entry with the largest absolute residual. The colour of an
+    element is the largest residual among its entries. The ring marks the element of the entry
+    selected in this step, white dots mark elements of entries selected in earlier steps.
     """
     experiment, method, path = drawn.experiments[0], drawn.methods[0], samples[0].path
     basis, samplings = load_basis(bases[0].path), read_samplings(path)
@@ -100,7 +100,7 @@ def deim_iterations(
 def iterations(
     V: np.ndarray, entries: np.ndarray, rows_per_element: int, count: int
 ) -> list[Iteration]:
-    """First ``count`` steps of DEIM, recomputed from the selected entries.
+    """Recompute the first ``count`` steps of DEIM from the selected entries.
 
     The residual of step k is v_k - V_{k-1} c: mode v_k minus its interpolation by the earlier modes
     V_{k-1}, with coefficients c from the equations at the entries so far (Chaturantabut and
@@ -134,10 +134,10 @@ def iterations(
     methods="deim qdeim block-deim",
 )  # fmt: skip
 def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
-    """The entries that DEIM selects without regard to elements lie on many elements, so that many
-    more entries are computed than used. Left: sampled elements of entry-wise DEIM, coloured by
-    coordinate. Middle: numbers of elements by how many of their entries are used. Right: entries
-    that have to be computed for a basis of size $r$, since a projection yields all entries of its
+    """Entry-wise DEIM scatters its entries over almost as many elements, so that many more entries
+    are computed than used. Left: elements that it samples, coloured by the coordinate of the
+    selected entry. Middle: number of sampled elements by how many of their entries are used. Right:
+    entries that have to be computed for a basis of size $r$; a projection yields all entries of its
     element at once.
     """
     scalar = [m for m, reduction in drawn.reductions.items() if reduction.rows == "scalar"]
@@ -236,11 +236,11 @@ LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures of the me
     }, scenes=SCENES, methods="deim block-deim pod",
 )  # fmt: skip
 def snapshots_and_modes(drawn: Drawn, **files: list[File]) -> Figure:
-    """The snapshots of the projections are the product of modes, singular values and coefficients.
-    Each column of the left matrix is a snapshot less the mean; singular values are the diagonal,
-    dark where large; red entries are positive, blue ones negative. Below: columns of the first
-    matrix on the moving mesh, and the first modes on the mesh at rest. The colour of an element is
-    one of its entries, whose coordinate and row are named, relative to the largest.
+    """Snapshots of the projections, less their mean, are a product of modes, singular values and
+    coefficients. Each column of the left matrix is a snapshot. Red entries are positive, blue
+    entries negative; large singular values are dark. Below: some snapshots on the deformed mesh,
+    and the first modes on the mesh at rest. The colour of an element is the value of one of its
+    entries (coordinate and row are in the title), relative to the largest absolute value.
     """
     experiment, path = drawn.experiments[0], files["bases"][0].path
     basis, snapshots = load_basis(path), load_snapshots(files["sets"][0].path)
@@ -284,7 +284,7 @@ def _height(window: Window, count: int) -> float:
 
 
 def _draw_product(figure: Figure, basis: Basis, centred: np.ndarray, title: str) -> None:
-    """Draw snapshots = modes x singular values x coefficients as matrices; rows sorted by axis."""
+    """Draw snapshots = modes x singular values x coefficients as matrices, rows sorted by axis."""
     from matplotlib.colors import LogNorm
 
     rank, tiny = basis.rank, np.finfo(float).tiny
@@ -312,7 +312,7 @@ def _draw_product(figure: Figure, basis: Basis, centred: np.ndarray, title: str)
         ax.set_yticks([third * (i + 0.5) for i in range(3)], ["x", "y", "z"])
         for i in (1, 2):
             ax.axhline(third * i - 0.5, color="black", linewidth=0.5)
-    axes[0].set_ylabel("rows of p, by axis", labelpad=5)
+    axes[0].set_ylabel("entries, by axis", labelpad=5)
     for x, sign in SIGNS:
         y = (whole - ABOVE - 0.5 * BLOCKS[2][2]) / whole
         figure.text(x / style.WIDTH, y, sign, ha="center", va="center", fontsize=14)

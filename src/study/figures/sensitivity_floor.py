@@ -1,4 +1,4 @@
-"""Figure of how far full-order runs from slightly different starts drift apart, by frame."""
+"""Figure of the difference of full-order runs from slightly different starts, by frame."""
 
 import numpy as np
 
@@ -24,12 +24,12 @@ COLUMNS = ["scene", "perturbation", "frame", "relative_difference"]
 def floors_of(
     sensitivity: list[File], horizon: Horizon
 ) -> dict[str, tuple[np.ndarray, int | None]]:
-    """Map each scene to its sensitivity (F,) and its horizon; None: beyond the run.
+    """Map each scene to its sensitivity (F,) and its horizon (None: beyond the last frame).
 
     The sensitivity is the relative difference between full-order runs with perturbed and
     unperturbed starts in each of F frames, the largest over all random seeds; it is empty without
-    perturbed runs. The horizon is the first frame in which it exceeds a threshold; from there on
-    runs cannot be compared. Raises StorageError for a damaged file.
+    perturbed runs. The horizon is the first frame in which it exceeds a threshold; later
+    frames of runs cannot be compared. Raises StorageError for a damaged file.
     """
     found = {}
     for file in sensitivity:
@@ -41,19 +41,19 @@ def floors_of(
 
 LOW, HIGH = 1e-12, 1e2
 MOST = 6  # largest number of curves
-HEIGHT = 2.15  # of the figure, inches
+HEIGHT = 2.15  # height of the figure, inches
 
 
 @figure(
-    title="How long scenes are predictable", reads=FLOORS,
+    title="Sensitivity and predictability horizon", reads=FLOORS,
     scenes="cloth_all cloth_all_twin strain_twist bar_release",
 )  # fmt: skip
 def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -> Figure:
     """In some scenes a tiny change of the initial positions grows until two full-order simulations
     disagree. Relative difference of two full-order simulations whose initial positions differ by
-    {sensitivity.reference} of the size of the body. The horizon of a scene (dot) is the first frame
-    at which the difference exceeds {sensitivity.threshold}; from there on (dotted) simulations of
-    this scene are not evaluated.
+    {sensitivity.reference} of the size of the body, by frame. The predictability horizon of a scene
+    (dot) is the first frame at which the difference exceeds {sensitivity.threshold} (grey line);
+    beyond it (dotted) simulations of the scene are not evaluated.
     """
     floors = floors_of(sensitivity, horizon)
     scenes = [scene for scene in drawn.scenes if len(floors[scene][0])][:MOST]
@@ -72,7 +72,7 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
         ax.plot(*points[last - 1 :].T, ":", color=colour, linewidth=1.0)
         if end is not None:
             ax.plot(*points[end], "o", color=colour, markersize=5.0, zorder=5)
-        found = "no horizon" if end is None else f"horizon {end}"
+        found = "predictable to the end" if end is None else f"horizon at frame {end}"
         labelled.append((f"{words.scene(scene)}: {found}", colour, points[:: len(points) // 8 + 1]))
     ax.set(xlabel="frame", ylabel="relative difference")
     text = "dotted: beyond the horizon, not evaluated"

@@ -1,4 +1,4 @@
-"""Figure of the stability map: the outcome of every reduced run of the study."""
+"""Figure of the stability map, which shows the outcome of every reduced run of the study."""
 
 from dataclasses import dataclass
 from textwrap import fill
@@ -16,14 +16,14 @@ ROW = 0.145  # height of a row of cells, inches
 SUBSPACES = {"full": "all elements", "ecsw": "sampled elements"}
 TITLE = 13  # longest line of the title of a block, characters
 GAP = 0.45  # distance between blocks of columns, in widths of a cell
-LEAST = 2.0  # smallest width of a block of columns, in widths of a cell, so that its title fits
+LEAST = 2.0  # smallest width of a block of columns, in widths of a cell: its title must fit
 
 
 @dataclass(frozen=True)
 class Look:
-    """Look of the cells of runs with one outcome: cell colour, symbol, its colour, legend text.
+    """Look of the cells with one outcome: cell colour, symbol, colour of the symbol, legend text.
 
-    Cells differ in lightness, those of failed runs have a symbol ("frame": that of the blow-up).
+    The outcomes differ in lightness, too. The symbol "frame" stands for the frame of the blow-up.
     """
 
     face: str
@@ -37,12 +37,12 @@ LOOKS = {
     "wrong": Look("#F3CB65", "", "black", "finite, error above the limit"),
     "left the scene": Look(style.VERMILLION, "\N{MULTIPLICATION SIGN}", "white", "left the scene"),
     "blow-up": Look("black", "frame", "white", "blow-up (in this frame)"),
-    "not run": Look("white", "\N{EN DASH}", "#777777", "not run: beyond the rank"),
+    "not run": Look("white", "\N{EN DASH}", "#777777", "not run: exceeds the rank"),
     "not judged": Look("#D9D9D9", "?", "#444444", "not judged: no error before the horizon"),
 }
 
 
-Cells = dict[tuple[str, str], pd.Series]  # a column of the map: (scene, group) -> table row
+Cells = dict[tuple[str, str], pd.Series]  # column of the map: (scene, group) -> table row
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Strip:
     xlabel: str
 
     def draw(self, ax: Axes) -> set[str]:
-        """Draw on ``ax`` a cell for each row and column with a run; return their outcomes."""
+        """Draw a cell for each row and column with a run; return the outcomes of these runs."""
         x, ticks, drawn = 0.0, [], set()
         for title, columns in self.blocks.items():
             width = len(columns)
@@ -97,13 +97,13 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
 
 @figure(title="Outcome of every reduced simulation", reads={"table": TableOf("stability")})
 def stability_map(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Simulations with one system per coordinate leave the scene at nearly every size; those
-    with one system for all coordinates, and those in position subspaces, seldom. Each cell is a
-    simulation of the training trajectory, by method, size and scene. The limit of the position
-    error before the horizon is {stability.wrong}; left the scene: the bounding box exceeds
-    {stability.left} times the largest one of the full-order model; blow-up: numbers that are not
-    finite, in the frame whose number is printed. Groups whose projections are rounding errors are
-    left out.
+    """Simulations with separate systems for the coordinates (preprint's selection and code) leave
+    the scene at nearly every basis size; simulations with one system, or in position subspaces,
+    seldom do. Each cell is a simulation of the training trajectory, by method, size and scene. The
+    position error relative to the full-order simulation, up to the predictability horizon, has the
+    limit {stability.wrong}. Left the scene: the bounding box exceeds {stability.left} times the
+    largest bounding box of the full-order simulation. Blow-up: positions are not finite in the
+    printed frame. Constraint groups whose projections are rounding errors are left out.
     """
     table = table[(table.experiment == "rerun") & (table.group.notna())]
     strips = [_local_strip(table, drawn), _subspace_strip(table, drawn)]

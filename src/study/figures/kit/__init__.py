@@ -1,1 +1,1 @@
-"""Helpers for figures: declaration of figures, and drawing of elements."""
+"""Helpers for figures: declaration, reading of results, labels, drawing of elements."""

@@ -63,11 +63,11 @@ AZIMUTH = 30.0  # azimuth of every camera, degrees
 
 
 class NothingToDraw(Exception):
-    """Raised if the configuration has no data for a figure."""
+    """Raised if a configuration has no data for a figure."""
 
 
 def held(table: pd.DataFrame) -> pd.DataFrame:
-    """Return ``table``; NothingToDraw if it has no row."""
+    """Return ``table``; raise NothingToDraw if it has no row."""
     if table.empty:
         raise NothingToDraw
     return table
@@ -89,8 +89,8 @@ class Experiment(BaseModel, extra="forbid", frozen=True):
     """A constraint group (all constraints of one kind) that is reduced in a scene.
 
     mesh, effects : identifier of the mesh of the scene, and all effects of the scene
-    only : True if the scene reduces no other group
-    method : reduction of the group, in the paths of its files; empty for all
+    only : whether the scene reduces no other group
+    method : reduction method, as in the paths of files; empty: all methods
     """
 
     scene: str
@@ -102,7 +102,7 @@ class Experiment(BaseModel, extra="forbid", frozen=True):
 
     @property
     def modules(self) -> tuple[str, ...]:
-        """Modules of the scene's effects, whose code determines drawn elements and obstacles."""
+        """Modules of the scene's effects; their code determines drawn elements and obstacles."""
         return tuple(sorted({EFFECTS[effect.effect] for effect in self.effects}))
 
     @property
@@ -118,7 +118,7 @@ class Experiment(BaseModel, extra="forbid", frozen=True):
         return scene if self.only else f"{scene}: {style.words(self.group)}"
 
     def find(self, files: Sequence[File], **labels: str) -> str:
-        """First path in ``files`` for this scene, group, mesh and ``labels``; "" without one."""
+        """Return the first path in ``files`` for this experiment and ``labels``, else ""."""
         own = self.labels | labels
         found = (f.path for f in files if all(own.get(k, v) == v for k, v in f.labels.items()))
         return next(found, "")
@@ -152,7 +152,7 @@ class Drawn(BaseModel, extra="forbid", frozen=True):
 
     @property
     def first_run(self) -> list[Experiment]:
-        """First of the `runs`; empty without one."""
+        """First of the `runs`; empty if there are no runs."""
         return self.runs[:1]
 
     @property
@@ -171,38 +171,38 @@ class Drawn(BaseModel, extra="forbid", frozen=True):
         return method_styles(self.methods)
 
     def of(self, scene: str) -> list[Experiment]:
-        """Experiments in ``scene``: one for each of its reduced constraint groups."""
+        """Return the experiments in ``scene``: one for each of its reduced constraint groups."""
         return [experiment for experiment in self.experiments if experiment.scene == scene]
 
     def groups_of(self, scene: str) -> str:
-        """Name of the reduced constraint group of ``scene``, or "several groups"."""
+        """Return the name of the reduced constraint group of ``scene``, or "several groups"."""
         groups = [experiment.group for experiment in self.of(scene)]
         return style.words(groups[0]) if len(groups) == 1 else "several groups"
 
     def title(self, method: str) -> str:
-        """Words for ``method``."""
+        """Return words for ``method``."""
         known = self.reductions.get(method)
         return style.plain_words(words.method(method, known.title if known else ""))
 
     def handles(self, looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
-        """Legend entries for ``looks`` (method -> colour, marker); ``common``: options of each."""
+        """Return legend entries for ``looks`` (method -> colour, marker); ``common``: options."""
         return [
             style.handle(self.title(method), color=colour, marker=marker, **common)
             for method, (colour, marker) in looks.items()
         ]
 
     def scenes_of(self, table: pd.DataFrame) -> list[str]:
-        """Scenes that have rows in ``table``; NothingToDraw if none has."""
+        """Return the scenes with rows in ``table``; raise NothingToDraw if there are none."""
         present = set(held(table[table.scene.isin(self.scenes)]).scene)
         return [scene for scene in self.scenes if scene in present]
 
     def styles(self, table: pd.DataFrame) -> dict[str, tuple[str, str]]:
-        """Those of `looks` whose methods have rows in ``table``; NothingToDraw without one."""
+        """Return `looks` of methods with rows in ``table``; raise NothingToDraw without rows."""
         present = set(held(table[table.method.isin(self.methods)]).method)
         return {method: look for method, look in self.looks.items() if method in present}
 
     def rows(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Rows of ``table`` whose scene, group and method are selected; NothingToDraw without."""
+        """Return rows with selected scene, group and method; raise NothingToDraw without rows."""
         pairs = pd.MultiIndex.from_frame(table[["scene", "group"]])
         drawn = pairs.isin([(each.scene, each.group) for each in self.experiments])
         return held(table[drawn & table.method.isin(self.methods)])
@@ -212,7 +212,7 @@ log = logging.getLogger(__name__)
 
 PNG_DPI = 200
 RASTER_DPI = 300  # dots per inch of the rasterised parts of a PDF
-TIMES = "times_of_run"  # key of the input of a timed figure that says whether times are reliable
+TIMES = "times_of_run"  # input of a timed figure: table that tells whether times are reliable
 DISTURBED = "these times are unreliable: other programs used the processor"
 NO_DATA = "no data in this configuration; the full study (config/default.yaml) draws this figure"
 
@@ -224,9 +224,9 @@ class Declaration(Artifact):
     title, caption : text in the mark-up of `study.artifact.text`; ``{key}`` in a caption stands
         for the value of a setting
     number : number of the figure of the preprint that this one reproduces; None if there is none
-    scenes, methods : names in the order of drawing, separated by blanks, as far as the study has
-        them; of a study that has none of them its own methods, and its scenes that fit:
-    groups, several : those that reduce one of ``groups`` (any group if empty), or several groups
+    scenes, methods : names in the order of drawing, separated by blanks; names that the study lacks
+        are left out. A study with none of them draws all its methods, and all its scenes that fit:
+    groups, several : scenes fit that reduce one of ``groups`` (empty: any), or several groups
     """
 
     caption: str = ""
@@ -245,7 +245,7 @@ class Declaration(Artifact):
         write_figure(drawn, to_plain(self.title), outputs["pdf"], png=outputs["png"])
 
     def draw(self, **read: Any) -> Figure:
-        """Draw the figure, or a note if it has no data; StorageError: file missing or damaged."""
+        """Draw the figure, or a note without data; StorageError for a missing or damaged file."""
         times = read.pop(TIMES, None)
         with style.look():
             try:
@@ -267,10 +267,10 @@ def figure(
 ) -> Callable[[Callable[..., Figure]], Declaration]:
     """Return a decorator that declares a function as the drawing of a figure.
 
-    The function gets the inputs ``reads``. If it has a parameter ``drawn``, it gets what the figure
-    draws of the study, by ``fields`` of `Declaration`. The caption is the docstring of the function
-    followed by ``more``; line breaks count as blanks. A ``timed`` figure draws times, and says so
-    if they are unreliable.
+    The function gets the inputs ``reads``. A parameter ``drawn`` gets the experiments and methods
+    that the figure draws, selected by ``fields`` of `Declaration`. The caption is the docstring of
+    the function followed by ``more``; line breaks count as blanks. A ``timed`` figure draws times,
+    with a note if they are unreliable.
 
     Raises TypeError if the docstring is missing, or if the parameters do not match ``reads``.
     """

@@ -1,4 +1,4 @@
-"""Drawing of the elements of a constraint group on the mesh, coloured by values."""
+"""Draw the elements of a constraint group on the mesh, coloured by values."""
 
 from dataclasses import dataclass
 
@@ -48,15 +48,15 @@ class ElementMap:
     mesh: Mesh
 
     def centres(self, points: np.ndarray) -> np.ndarray:
-        """Centre (e, 3) m of each element if the mesh's vertices are at ``points`` (N, 3) m."""
+        """Return the centres (e, 3) m of all elements for vertices at ``points`` (N, 3) m."""
         return points[self.cells].mean(axis=1)
 
     def face_values(self, values: np.ndarray) -> np.ndarray:
         """Transfer ``values`` of elements (e,) to the triangles of the surface, (T,).
 
         If elements are triangles or tetrahedra, a surface triangle gets the value of its element.
-        If they are vertices or edges, it gets the mean over its three vertices (NaN if none has a
-        value). The value of a vertex is the given one, or the mean over edges that meet there.
+        If elements are vertices or edges, it gets the mean over its three vertices (NaN if none of
+        them has a value); without a given value, a vertex gets the mean over its edges.
         """
         triangles = self.mesh.triangles
         if self.kind == "triangle":
@@ -68,7 +68,7 @@ class ElementMap:
             return values[[behind[tuple(sorted(triangle))] for triangle in triangles.tolist()]]
         ends, n = self.cells if self.kind == "edge" else self.cells[:, :1], self.mesh.vertices
         total = np.bincount(ends.ravel(), np.repeat(values, ends.shape[1]), minlength=n)
-        with np.errstate(invalid="ignore"):  # NaN, 0 / 0, where there is no value
+        with np.errstate(invalid="ignore"):  # 0 / 0 = NaN marks vertices without a value
             corners = (total / np.bincount(ends.ravel(), minlength=n))[triangles]
             known = np.isfinite(corners)
             return np.where(known, corners, 0.0).sum(axis=1) / known.sum(axis=1)
@@ -77,14 +77,14 @@ class ElementMap:
         self, ax: Axes, points: np.ndarray, values: np.ndarray, camera: Camera,
         colours: ScalarMappable,
     ) -> None:  # fmt: skip
-        """Draw the mesh at ``points`` (N, 3) m, elements coloured by ``values`` (e,)."""
+        """Draw the mesh at ``points`` (N, 3) m with its elements coloured by ``values`` (e,)."""
         from matplotlib.collections import LineCollection
 
         if self.kind == "edge" and not len(self.mesh.tetrahedra):
             look = {"colour": "#FFFFFF", "wire": 0.0, "contrast": 0.15}
             draw_surface(ax, points, self.mesh, camera=camera, **look)
             lines = points[self.cells]
-            order = np.argsort(camera.depth(lines.mean(axis=1)), kind="stable")  # far ones first
+            order = np.argsort(camera.depth(lines.mean(axis=1)), kind="stable")  # far edges first
             flat, shades = camera.project(lines.reshape(-1, 3)), colours.to_rgba(values)
             look = {"linewidths": 1.2, "capstyle": "round", "rasterized": len(lines) > RASTER_ABOVE}
             flat = flat.reshape(-1, 2, 2)[order]
@@ -99,8 +99,8 @@ class ElementMap:
 def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMap:
     """Return the elements of the constraint ``group`` on ``mesh``, in the order of snapshot rows.
 
-    Raises StorageError if the effect ``group`` is no constraint group, or its number of elements on
-    ``mesh`` is not ``elements``, the number in the file ``source``.
+    Raises StorageError if the effect ``group`` is no constraint group, or if ``elements``, the
+    number of elements in the file ``source``, is not the number of elements on ``mesh``.
     """
     effect = EFFECTS.load(group)
     if not issubclass(effect, ConstraintGroup):
@@ -114,8 +114,8 @@ def element_map(group: str, mesh: Mesh, elements: int, source: str) -> ElementMa
 def signed_entry(vector: np.ndarray, rows_per_element: int) -> tuple[np.ndarray, str]:
     """Return one of the 3 p entries of each element (e,), and the name of this entry.
 
-    ``vector`` has 3 p entries for each of e elements, p = ``rows_per_element``. The entry has the
-    same index in every element: that of the largest |value| in ``vector``. Names: "x", "x, row 2".
+    ``vector`` has 3 p entries for each of e elements, p = ``rows_per_element``. All elements use
+    the index at which ``vector`` has its largest absolute value. Names: "x", "x, row 2".
     """
     entries = vector.reshape(-1, 3 * rows_per_element)
     slot = int(np.argmax(np.abs(vector))) % (3 * rows_per_element)

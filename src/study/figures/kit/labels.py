@@ -1,4 +1,4 @@
-"""Labels beside curves and marks, at places where little is in their way."""
+"""Place labels next to curves and marks, where they cover little of the figure."""
 
 from collections.abc import Sequence
 from itertools import pairwise, product
@@ -18,12 +18,12 @@ Place = tuple[float, int, int, np.ndarray]  # cost, number of the point, of the 
 
 
 def label_curves(ax: Axes, curves: Sequence[Curve], size: tuple[float, float]) -> None:
-    """Write the label of each curve beside one of its points, in its colour.
+    """Write the label of each curve next to one of its points, in the colour of the curve.
 
-    The places that are tried are those around all points of the curve; that with the least ink and
-    text in its way is taken, and each label is placed again when the others have their places. The
-    approximate ``size`` of ``ax`` is in inches; its limits must have been set. A curve without a
-    label is only in the way.
+    Of all places around the points of a curve, the label gets the place where it covers least ink
+    and text. When all labels have places, each label is placed again. ``size`` is the approximate
+    size of ``ax`` in inches; the limits of ``ax`` must have been set. Labels also avoid curves that
+    have no label.
     """
     scaled = [_inches(ax, points, size) for *_, points in curves]
     ink, places = np.concatenate([_dense(points) for points in scaled]), dict[int, Place]()
@@ -52,7 +52,7 @@ def _inches(ax: Axes, points: np.ndarray, size: tuple[float, float]) -> np.ndarr
 
 
 def _box(point: np.ndarray, label: str, offset: tuple[float, float]) -> np.ndarray:
-    """Lower left and upper right corner of ``label`` with an ``offset`` from ``point``, inches."""
+    """Return the lower left and upper right corner (inches) of ``label`` next to ``point``."""
     extent = np.array([CHARACTER * len(label), HEIGHT])
     corner = point + OFFSET * np.array(offset) + 0.5 * extent * (np.sign(offset) - 1.0)
     return np.array([corner, corner + extent])
@@ -61,7 +61,7 @@ def _box(point: np.ndarray, label: str, offset: tuple[float, float]) -> np.ndarr
 def _cost(
     box: np.ndarray, size: tuple[float, float], ink: np.ndarray, taken: list[np.ndarray]
 ) -> float:
-    """How much lies in the way of a label in ``box``: the border, ``ink``, or other labels."""
+    """Measure how much a label in ``box`` covers: space outside the axes, ink, other labels."""
     outside = np.maximum(-box[0], 0.0).sum() + np.maximum(box[1] - size, 0.0).sum()
     covered = ((ink > box[0] - 0.02) & (ink < box[1] + 0.02)).all(axis=1).sum()
     clashes = sum((box[0] < b[1]).all() and (b[0] < box[1]).all() for b in taken)
@@ -69,7 +69,7 @@ def _cost(
 
 
 def _dense(points: np.ndarray) -> np.ndarray:
-    """Points 0.02 apart on the lines through ``points`` (n, 2), without those that are NaN."""
+    """Return points every 0.02 inches on the lines through the finite ``points`` (n, 2)."""
     points = points[np.isfinite(points).all(axis=1)]
     lines = [np.linspace(a, b, 2 + int(np.abs(b - a).max() / 0.02)) for a, b in pairwise(points)]
     return np.concatenate([*[points] * 3, *lines])  # marks count more than lines

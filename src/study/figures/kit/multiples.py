@@ -1,4 +1,4 @@
-"""Figures of many small panels that share the y axis and a legend, and axes of times."""
+"""Lay out figures of many small panels that share a y axis and a legend; label axes."""
 
 from collections.abc import Sequence
 
@@ -13,19 +13,19 @@ PANEL_HEIGHT = 1.45  # inches
 def small_multiples(
     count: int, columns: int, legend_rows: int = 1, height: float = PANEL_HEIGHT
 ) -> tuple[Figure, list[Axes]]:
-    """Figure of ``count`` panels that share y, with space for ``legend_rows`` lines below."""
+    """Make ``count`` panels that share the y axis, with space for ``legend_rows`` lines below."""
     rows = rows_of(count, columns)
     figure = style.new_figure(rows * height + 0.2 * legend_rows + 0.35)
     return figure, panels(figure, count, columns, sharey=True)
 
 
 def rows_of(count: int, columns: int) -> int:
-    """Number of rows that ``count`` panels need in ``columns`` columns."""
+    """Return the number of rows that ``count`` panels need in ``columns`` columns."""
     return -(-count // min(columns, count))
 
 
 def panels(figure: Figure, count: int, columns: int, sharey: bool = False) -> list[Axes]:
-    """Add ``count`` panels to ``figure`` row by row in ``columns``."""
+    """Add ``count`` panels to ``figure``, row by row, in ``columns`` columns."""
     columns = min(columns, count)
     grid = figure.subplots(rows_of(count, columns), columns, squeeze=False, sharey=sharey)
     axes = list(grid.ravel())
@@ -52,7 +52,7 @@ def label_rows(ax: Axes, names: Sequence[str]) -> None:
 
 
 def time_axis(ax: Axes, times: np.ndarray) -> None:
-    """Make x of ``ax`` logarithmic, with limits around ``times`` and plain labels, such as 20."""
+    """Make the x axis logarithmic, with limits around ``times`` and plain labels such as 20."""
     ax.set_xscale("log")
     low, high = np.log10(np.nanmin(times)), np.log10(np.nanmax(times))
     pad = max(0.1, 0.08 * (high - low))
@@ -61,7 +61,7 @@ def time_axis(ax: Axes, times: np.ndarray) -> None:
 
 
 def plain_ticks(axis: Axis, decades: float) -> None:
-    """Label two or more ticks of a log ``axis``, ``decades`` long, by numbers, not powers."""
+    """Label at least two ticks of a log ``axis`` of ``decades`` decades by plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     steps = [(0.4, (1, 1.5, 2, 3, 5, 7)), (0.7, (1, 2, 3, 5)), (1.3, (1, 2, 5)), (2.0, (1, 3))]

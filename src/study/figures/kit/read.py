@@ -15,9 +15,9 @@ from pdrom.view.panels import RunPanel
 def positions_at(
     path: str, fractions: tuple[float, ...], end: int | None = None
 ) -> tuple[list[int], np.ndarray]:
-    """Frame numbers and positions (n, N, 3) m of a run at ``fractions`` of its frames.
+    """Read frame numbers and positions (n, N, 3) m of a run at ``fractions`` of its frames.
 
-    ``path`` is its file, ``end`` the frame that counts as its end (None: the last one). Raises
+    ``path`` is the file of the run, ``end`` the frame of fraction 1 (None: the last frame). Raises
     StorageError if the file is missing or holds positions that are not finite.
     """
     with open_hdf5(path) as file:
@@ -32,12 +32,12 @@ def positions_at(
 
 @dataclass(frozen=True)
 class RerunInfo:
-    """Reduced run of one basis size r in the group ``label`` of the HDF5 file ``path``.
+    """Reduced run with basis size r, in the group ``label`` of the HDF5 file ``path``.
 
     full : whether r is the numerical rank of the snapshots
-    marked : whether r exceeds that rank, so that nothing ran
-    blowup_frame : frame at which the run blew up, -1 if it did not
-    every : the positions of frames 0, every, 2 every, ... are stored
+    marked : whether r exceeds this rank, so that there is no run
+    blowup_frame : frame at which the run blew up; -1 if it did not blow up
+    every : distance of the stored frames 0, every, 2 every, ...
     """
 
     path: str
@@ -54,7 +54,7 @@ class RerunInfo:
         return f"r = {self.r} (full rank)" if self.full else f"r = {self.r}"
 
     def at(self, frame: int) -> tuple[int, np.ndarray] | None:
-        """Number and positions (N, 3) m of the last finite frame up to ``frame``, or None."""
+        """Read number and positions (N, 3) m of the last finite frame up to ``frame``, or None."""
         with open_hdf5(self.path) as file:
             stored = file[self.label]["positions"]
             for entry in range(min(frame // self.every, len(stored) - 1), -1, -1):
@@ -64,7 +64,7 @@ class RerunInfo:
         return None
 
     def panel(self, frame: int, colour: Colour) -> RunPanel:
-        """Panel of the run at ``frame``, with a message if it failed or never began."""
+        """Return a panel of the run at ``frame``, with a message if it failed or did not start."""
         if self.marked:
             remark = "not run: r exceeds\nthe numerical rank"
             return RunPanel(self.title, colour, None, remark=remark)
@@ -79,7 +79,7 @@ class RerunInfo:
 
 
 def rerun_infos(path: str, inside: str = "") -> list[RerunInfo]:
-    """Reduced runs in the HDF5 file ``path``, or in its group ``inside``, ascending in r."""
+    """Read the reduced runs in the HDF5 file ``path``, or in its group ``inside``, by r."""
     with open_hdf5(path) as file:
         return [
             RerunInfo(
@@ -97,7 +97,7 @@ def rerun_infos(path: str, inside: str = "") -> list[RerunInfo]:
 
 
 def choose_ranks(infos: list[RerunInfo], wanted: tuple[int | str, ...]) -> list[RerunInfo]:
-    """Select runs by sizes ``wanted`` ("full": the rank), in that order; all if none match."""
+    """Select runs by sizes ``wanted`` ("full": the rank), in this order; all if none match."""
     chosen = [i for rank in wanted for i in infos if (i.full if rank == "full" else i.r == rank)]
     return list(dict.fromkeys(chosen)) or infos
 
