@@ -1,1 +1,1 @@
-"""The manuscript as web pages: its text, with links from each number to its table."""
+"""The manuscript as web pages, with a link from each number to the table rows behind it."""

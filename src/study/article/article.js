@@ -1,10 +1,10 @@
-// Outcomes of the last verification on every page; on that of a table its rows, sorted and chosen by the address.
+// Show results of the last verification on every page, and the rows of a table on its page: the address selects rows, buttons sort them.
 "use strict";
 
 const SHOWN = 100;
 const TAKES = ["max", "min", "median", "count", "distinct"];
 
-// Rows of a CSV text; a quoted cell may hold commas, quotes and line ends.
+// Return the rows of a CSV text; a quoted cell may contain commas, quotes and line ends.
 function parse(text) {
   const rows = [];
   let row = [], cell = "", quoted = false;
@@ -22,7 +22,7 @@ function parse(text) {
   return rows;
 }
 
-// A key as in the manuscript: column=value|column!=value|column|aggregate.
+// Parse a key as in the manuscript: column=value|column!=value|column|aggregate.
 function asked(key) {
   const found = { filters: [], column: null, take: null };
   for (const part of key.split("|").filter(Boolean)) {
@@ -34,7 +34,7 @@ function asked(key) {
   return found;
 }
 
-// Key in the address; none where that is cut off within a sign.
+// Return the key in the address; "" if the address ends within an encoded character.
 function keyOfAddress() {
   try {
     return decodeURIComponent(location.hash.slice(1));
@@ -47,7 +47,7 @@ function same(cell, value) {
   return cell === value || (cell !== "" && value !== "" && Number(cell) === Number(value));
 }
 
-// Numbers of the rows that agree with a key.
+// Return the indices of the rows that satisfy a key.
 function matching(table, key) {
   const { filters } = asked(key), places = filters.map((filter) => table.head.indexOf(filter[0]));
   return table.rows.map((_, i) => i).filter((i) => filters.every(([, sign, value], f) =>
@@ -83,12 +83,12 @@ async function showTable(name) {
     start = 0;
     const places = filters.map((filter) => filter.join(" ").replace(" = ", ": ").replace(" != ", " is not "));
     $("asked").textContent = column || places.length
-      ? `${take ? `The ${take} of ` : ""}${column ?? "All"} ${places.length ? `where ${places.join(", ")}` : "over all rows"}.` : "";
+      ? `${take ? `Shown: ${take} of ` : "Shown: "}${column ?? "all columns"} ${places.length ? `in rows with ${places.join(", ")}` : "in all rows"}.` : "";
     $("every").hidden = !location.hash;
     const about = column === null ? null : $("columns").querySelector(`tr[data-column="${CSS.escape(column)}"]`);
     const gone = [column, ...filters.map(([name]) => name)].filter((name) => name !== null && ![...head, "row"].includes(name));
     const [meaning, unit, kind, tolerance] = [...(about?.cells ?? [])].slice(1).map((cell) => cell.textContent);
-    $("column").textContent = about ? `${column}: ${meaning}${unit && `, ${unit}`}. Compared as ${kind}; tolerance: ${tolerance}.`
+    $("column").textContent = about ? `${column}: ${meaning}${unit && `, ${unit}`}. Comparison by verify: ${kind}; tolerance: ${tolerance}.`
       : gone.length ? `This table has no column ${gone.join(", ")}.` : "";
     show();
   };
@@ -104,7 +104,7 @@ async function showTable(name) {
       element("button", title, cell).onclick = () => {
         order = { column: place, down: order?.column === place && !order.down };
         choose();
-        $("rows").querySelectorAll("button")[place].focus(); // the one that was pressed is gone
+        $("rows").querySelectorAll("button")[place].focus(); // the pressed button was replaced
       };
     });
     for (const i of chosen.slice(start, start + SHOWN)) {
@@ -129,13 +129,13 @@ async function showTable(name) {
 }
 
 function showVerified(place, name) {
-  place.textContent = window.pdromVerified?.[name] ?? "not yet";
+  place.textContent = window.pdromVerified?.[name] ?? "not run";
 }
 
 for (const place of document.querySelectorAll("[data-verified]")) showVerified(place, place.dataset.verified);
 const page = document.getElementById("table");
 if (page) showTable(page.dataset.name).catch(() => {
-  document.getElementById("asked").textContent = "The rows cannot be read: this file was cut or changed. ./reproduce article writes it again.";
+  document.getElementById("asked").textContent = "The rows cannot be read, because this file was truncated or changed. ./reproduce article writes it again.";
 });
 for (const place of document.querySelectorAll('math[display="inline"]')) {
   if (place.getBoundingClientRect().right > innerWidth) { place.classList.add("wide"); place.tabIndex = 0; }

@@ -1,4 +1,4 @@
-"""The article: web pages with the text of paper and supplement, all tables, and all claims."""
+"""Build the article: web pages with the text of paper and supplement, all tables, all claims."""
 
 import base64
 import gzip
@@ -43,12 +43,12 @@ Drawn = Mapping[str, tuple[tuple[int, int], bool]]  # figure -> size in pixels, 
 def shown_figure(name: str, node: Node, drawn: Drawn, known: Collection[str]) -> Node:
     """Return a figure as a node of pandoc's syntax tree: picture, caption, shell command, links.
 
-    ``node`` is what pandoc made of it, ``known`` the names of all tables that have a page.
+    ``node`` is the figure as pandoc parsed it, ``known`` has the names of all tables with a page.
     """
     size, with_pdf = drawn[name]
     attribute, caption, _ = node["c"]
     picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
-    # a single text node: pandoc would hide a caption with the same nodes as the alternative text
+    # a single text node, because pandoc hides a caption that has the nodes of the alternative text
     alternative = words(plain(caption[1]).strip())
     image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
     made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, known)]}
@@ -58,37 +58,37 @@ def shown_figure(name: str, node: Node, drawn: Drawn, known: Collection[str]) ->
 
 
 def _origin(name: str, with_pdf: bool, known: Collection[str]) -> str:
-    """HTML: shell command that makes a figure; links to its tables and its PDF."""
+    """Return HTML: shell command that makes a figure, and links to its tables and its PDF."""
     reads = declarations()[name].reads.values()
     tables = [r.name for r in reads if isinstance(r, TableOf) and r.name in known]
     data = ", ".join(f'<a href="tables/{table}.html">{table}</a>' for table in tables)
     pdf = f'<a href="figures/{name}.pdf">PDF</a>. ' if with_pdf else ""
     return (
         f"<code>./reproduce figure {name}</code>. "
-        f"{f'Data: {data}.' if tables else 'Drawn from the runs themselves.'} {pdf}"
-        f'Last verification: <span data-verified="figure {name}">not yet</span>.'
+        f"{f'Data: {data}.' if tables else 'Drawn from files of simulations.'} {pdf}"
+        f'Last <code>./reproduce verify</code>: <span data-verified="figure {name}">not run</span>.'
     )
 
 
 FACTS = {
-    "study": "Settings of the study that its text states",
-    "methods": "Methods of the configuration",
+    "study": "Settings of the study that the paper states",
+    "methods": "Reduction methods of the configuration",
     "scenes": "Scenes of the configuration",
-    "machine": "The machine that the study ran on",
+    "machine": "Machine on which the study ran",
 }
 
 
 def table_page(name: str, csv: bytes, template: str) -> str:
-    """HTML page of table ``name``: data (``csv``), shell command to make it, column meanings."""
+    """Return the page of table ``name``: rows (``csv``), shell command, meanings of columns."""
     table = declared().get(name)
     columns = "".join(
         f"<tr data-column='{c.name}'><th scope=row>{c.name}</th>"
         f"<td>{escape(c.meaning)}</td><td>{escape(c.unit)}</td>"
         f"<td>{c.quantity}: {escape(QUANTITIES[c.quantity])}</td>"
-        f"<td>{f'{c.within:g}' if c.quantity in TOLERANCES else 'not judged'}</td></tr>"
+        f"<td>{f'{c.within:g}' if c.quantity in TOLERANCES else 'not compared'}</td></tr>"
         for c in (table.columns if table else ())
     )
-    none = "<tr><td colspan=5>facts of the configuration, compared with nothing</td></tr>"
+    none = "<tr><td colspan=5>facts about the configuration, not compared by verify</td></tr>"
     parts = {
         "NAME": name,
         "TITLE": escape(titles()[name]),
@@ -100,27 +100,27 @@ def table_page(name: str, csv: bytes, template: str) -> str:
 
 
 def titles() -> dict[str, str]:
-    """Mapping of the names of all tables that may have a page to their titles."""
+    """Return name -> title of all tables that may have a page."""
     return FACTS | {name: table.title for name, table in declared().items()}
 
 
 def argument(name: str) -> str:
-    """Argument with which ``./reproduce`` makes table ``name`` (of results, or one of `FACTS`)."""
+    """Return the argument with which ``./reproduce`` makes table ``name`` (result or fact)."""
     if name in FACTS:
         return "paper_inputs"
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
 
 
-PARTS = {"published": "As published", "beyond": "Beyond"}
+PARTS = {"published": "Preprint's method", "beyond": "Improved method"}
 
 
 def claims_page(
     claims: Mapping[str, ClaimRule], tests: pd.DataFrame, verdicts: pd.DataFrame,
     pages: Mapping[str, str], template: str,
 ) -> str:  # fmt: skip
-    """HTML page of all ``claims`` (rules by name), with their tests and verdicts.
+    """Return the page of all ``claims`` (name -> rule) with their tests and verdicts.
 
-    pages : file name of the page with each figure, by the figure's name
+    pages : name of a figure -> file name of the page that shows it
     """
     found, body = verdicts.set_index("claim"), ""
     for name, rule in claims.items():
@@ -135,14 +135,14 @@ def claims_page(
             f"<section aria-labelledby='{name}'><h2 id='{name}'>{name}: {escape(rule.paper)}</h2>"
             f"<p>{escape(rule.text)} <small>{escape(rule.source)}, section {escape(rule.section)}, "
             f"figures: {escape(rule.shown)}. Qualifiers: {escape(rule.qualifiers)}.</small></p>"
-            f"<p><strong>As published: {escape(verdict.verdict)}. "
-            f"Beyond: {escape(verdict.verdict_beyond)}.</strong> "
-            f"By both errors: {escape(verdict.verdict_both)}; beyond: "
+            f"<p><strong>Preprint's method: {escape(verdict.verdict)}. "
+            f"Improved method: {escape(verdict.verdict_beyond)}.</strong> If the deformation error "
+            f"counts, too: {escape(verdict.verdict_both)}; improved method: "
             f"{escape(verdict.verdict_beyond_both)}. Last "
-            f"<code>./reproduce verify</code>: <span data-verified='claim {name}'>not yet</span>. "
+            f"<code>./reproduce verify</code>: <span data-verified='claim {name}'>not run</span>. "
             f"Command: <code>./reproduce claims</code>. Shown in <a href='{place}'>{shown}</a>.</p>"
             f"{''.join(_tests(name, part, getattr(rule, part), mine) for part in PARTS)}"
-            f"<h3>History of the rules</h3><ul>{history}</ul>"
+            f"<h3>Changes of the rules</h3><ul>{history}</ul>"
             f"<p><small>Rules: <code>config/claims.yaml</code>, "
             f"fingerprint {rule.fingerprint}.</small></p></section>"
         )
@@ -150,13 +150,13 @@ def claims_page(
 
 
 def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFrame) -> str:
-    rows = "<tr><th>test</th><th>rule</th><th>rows that satisfy it</th><th>found</th></tr>"
+    rows = "<tr><th>test</th><th>rule</th><th>rows that satisfy the rule</th><th>result</th></tr>"
     place = f"tables/claims_tests.html#claim={name}|part={part}|satisfied"
     for rule, row in zip(rules, tests[tests.part == part].itertuples(), strict=True):
-        aside = "" if rule.decides else " (beside the verdict)"
+        note = "" if rule.decides else " (does not decide the verdict)"
         spread = f"{row.least:.2g} to {row.most:.2g}, median {row.median:.2g}: "
         rows += (
-            f"<tr><td>{escape(rule.what)}{aside}</td><td>{_rule(rule)}</td>"
+            f"<tr><td>{escape(rule.what)}{note}</td><td>{_rule(rule)}</td>"
             f"<td><a class=val href='{place}'>{row.satisfied} of {row.of}</a></td>"
             f"<td>{'' if pd.isna(row.least) else spread}{escape(row.verdict)}</td></tr>"
         )
@@ -169,7 +169,7 @@ def _rule(rule: TestRule) -> str:
     where = "; ".join(
         f"{column}: {', '.join(map(str, values))}" for column, values in rule.where.items()
     )
-    margin = f"; ratios within a factor {rule.factor:g} decide nothing" if rule.timed else ""
+    margin = f"; undecided if within a factor {rule.factor:g} of it" if rule.timed else ""
     return (
         f"<code>{rule.metric}</code> of <a href='tables/{table}.html'>{table}</a>"
         f"{f' ({escape(where)})' if where else ''} "
@@ -182,9 +182,9 @@ VERIFIED, INDEX = "verified.js", "index.html"
 
 
 def write_verified(found: Mapping[str, str], folder: Path) -> None:
-    """Write outcomes of ``./reproduce verify`` to a script in ``folder`` that all pages load.
+    """Write the results of ``./reproduce verify`` to a script in ``folder`` that all pages load.
 
-    ``found`` maps kind and name of a result, such as "table payoff", to its outcome.
+    ``found`` maps kind and name of an output, such as "table payoff", to the result of its check.
     """
     write_text(f"window.pdromVerified={safe_json(dict(found))};\n", folder / VERIFIED)
 
@@ -200,11 +200,11 @@ ASSETS = {
 # Name of a TeX source -> file name of its web page.
 PAGES = dict(zip(DOCUMENTS, (INDEX, "supplement.html"), strict=True))
 TITLES = dict(zip(DOCUMENTS, ("Paper", "Supplement"), strict=True))
-# Page -> its title, and the rule without which there is no such page.
+# Page -> title, and the rule without which the page does not exist.
 LINKS = {
     "tables.html": ("Tables", ""),
     "claims.html": ("Claims", "claims_table"),
-    "live.html": ("A model, running", "live_page"),
+    "live.html": ("Interactive models", "live_page"),
 }
 _PREFIX = re.compile(r"\\renewcommand\{?\\thefigure\}?\{([A-Z]+)")
 
@@ -218,7 +218,7 @@ def write_article(
 
     inputs : generated files that the manuscript includes; numbers.json: table cells of its numbers
     figures, pictures : PDF and PNG of each figure
-    made : rules of all tables, figures and pages of the study
+    made : names of the rules of all tables, figures and pages of the study
     claims, added : see `load_claims`
     assets : templates, style and script (files of `ASSETS`)
     """
@@ -275,12 +275,12 @@ def write_article(
 
 
 def _links(pages: Mapping[str, str], above: str = "") -> str:
-    """HTML: links to ``pages`` (address -> words) from a page in their folder ``above`` its own."""
+    """Return HTML links to ``pages`` (address -> words); ``above``: path to the folder of pages."""
     return " ".join(f'<a href="{above}{page}">{words}</a>' for page, words in pages.items())
 
 
 def _write_figures(figures: list[File], pictures: list[File], outputs: Mapping[str, str]) -> Drawn:
-    """Write WebP pictures, and PDFs if small."""
+    """Write each figure as WebP, and as PDF if that is small."""
     png = {picture["name"]: Path(picture.path) for picture in pictures}
     made = {}
     for name, pdf in sorted((figure["name"], Path(figure.path)) for figure in figures):
@@ -305,14 +305,14 @@ WRITES = {
     **{f"table_{name}": f"tables/{name}.html" for name in (*declared(), *FACTS)},
     **{f"picture_{name}": f"figures/{name}.webp" for name in declarations()},
 }  # fmt: skip
-LIMIT = 300.0  # time limit of pandoc, s; a TeX definition that expands to itself never ends
+LIMIT = 300.0  # time limit of pandoc, s, since a TeX definition that expands to itself never ends
 
 
 def parsed(text: str, files: Mapping[str, str], references: Path) -> Node:
     r"""Return pandoc's syntax tree of the LaTeX source ``text`` and of its bibliography.
 
-    ``files`` are those that the source reads by ``\input``, name -> content. Raises PaperError if
-    pandoc is not installed, or if it rejects the source.
+    ``files`` maps names of the files that the source reads by ``\input`` to contents. Raises
+    PaperError if pandoc is not installed, or if it rejects the source.
     """
     with tempfile.TemporaryDirectory(prefix="pdrom-pandoc-") as folder:
         for name, content in {**files, "article.tex": text}.items():
@@ -334,7 +334,7 @@ def _run(words: Sequence[str], folder: str | None, given: str) -> str:
     spec = find_spec("pypandoc")
     program = Path(spec.origin or "").parent / "files" / "pandoc" if spec else None
     if program is None or not program.is_file():
-        raise PaperError("no pandoc: the package pypandoc-binary of requirements.lock is missing")
+        raise PaperError("no pandoc: package pypandoc-binary is missing; install requirements.lock")
     command = [str(program), "--quiet", *words]
     try:
         done = subprocess.run(
@@ -342,15 +342,15 @@ def _run(words: Sequence[str], folder: str | None, given: str) -> str:
             timeout=LIMIT, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired as error:
-        raise PaperError(f"pandoc does not end within {LIMIT:g} s") from error
+        raise PaperError(f"pandoc did not end in {LIMIT:g} s; does a macro call itself?") from error
     if done.returncode != 0:
-        raise PaperError(f"pandoc: {' '.join(done.stderr.split())[:300]}")
+        raise PaperError(f"pandoc rejects the text: {' '.join(done.stderr.split())[:300]}")
     return done.stdout
 
 
 article = Artifact(
     "article",
-    "The manuscript as a page",
+    "Manuscript as web pages",
     {
         **paper_inputs.reads,
         **paper.reads,

@@ -1,8 +1,8 @@
-r"""Conversion of the manuscript's source to LaTeX that pandoc can read, with numbers as links.
+r"""Convert the manuscript's source to LaTeX that pandoc can read, with numbers as links.
 
-Commands that TeX would evaluate are replaced here by their results: ``\n``, ``\known``,
-``\ifpart``, captions of figures. A number becomes a link to ``origin:KEY``, where KEY names a
-table and rows, in hexadecimal.
+Commands that TeX would evaluate are replaced by their results: ``\n``, ``\known``, ``\ifpart`` and
+captions of figures. A number becomes a link to ``origin:KEY``, where KEY names a table and its rows
+in hexadecimal digits.
 """
 
 import re
@@ -33,8 +33,8 @@ _NUMBER = re.compile(
 )
 _TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # number at the end of a cell: "holds (20/20)"
 _FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end{figure}"
-# Finds one-line definitions of TeX commands and theorems in the preamble; pandoc can read these.
-# Definitions of layout commands are left out: `REPLACED` has simple ones of the same commands.
+# One-line definitions of TeX commands and theorems in the preamble, which pandoc can read.
+# Definitions of layout commands are left out: `REPLACED` defines simpler commands of these names.
 _SHORT = re.compile(
     r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile|pictureof|n|known|row)\w+\}.*\}|newtheorem.*)$"
 )
@@ -48,8 +48,8 @@ REPLACED = r"""
 def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Facts) -> str:
     """Return the ``source`` of a ``document`` for pandoc, with numbers as links to tables.
 
-    ``origins`` is the content of numbers.json: for each number its table cells, for each document
-    which of its ``\\known`` blocks are shown. ``facts`` has the figures' captions.
+    ``origins`` is the content of numbers.json: the table cells of each number, and for each
+    document which of its ``\\known`` blocks are shown. ``facts`` has the captions of figures.
     """
     preamble, begin, text = source.partition(r"\begin{document}")
     text = COMMENT.sub("", _decided(text, origins["known"][document]))
@@ -79,7 +79,7 @@ def _title(preamble: str) -> str:
 
 
 def _decided(source: str, known: Sequence[str]) -> str:
-    r"""Keep or drop each block ``\known``, by ``known``."""
+    r"""Keep or drop each block ``\known`` as its decision in ``known`` says."""
     pieces, start = [], 0
     for sentence, decision in zip(sentences(source), known, strict=True):
         pieces += [source[start : sentence.start], sentence.text if decision == SHOWN else ""]
@@ -88,7 +88,7 @@ def _decided(source: str, known: Sequence[str]) -> str:
 
 
 def _apart(found: re.Match[str]) -> str:
-    """Split a formula at its numbers (``\\n``), as a link cannot stand inside a formula."""
+    """Split a formula at its numbers (``\\n``), because a formula cannot contain a link."""
     if not NAMED.search(found[1]):
         return found[0]
     parts = re.split(r"(\\n\{[^{}]*\})", found[1])
@@ -103,9 +103,9 @@ def _link(key: str, text: str) -> str:
 def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the TeX ``table`` with its numbers as links to rows of the study's tables.
 
-    All links lead to the one of ``tables`` with most columns in common with ``table``: to row i
-    from row i if both have as many rows, or else to rows with equal cells in common columns, but
-    for columns in which no row has an equal cell (rounded numbers, sums, titles).
+    All links lead to the study's table that shares most columns with ``table``. If both tables have
+    equally many rows, row i links to row i. Otherwise a row links to rows with equal cells in the
+    shared columns, except columns in which no row has an equal cell (rounded numbers, titles).
     """
     (columns, header), *body = table
     origin = max(tables, key=lambda name: len({*header} & {*tables[name]}))
@@ -117,7 +117,7 @@ def linked_table(table: Rows, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) -> list[str]:
-    """Filters ``column=value`` that select rows of ``table`` with the ``cells`` of a TeX row."""
+    """Return filters ``column=value`` that select rows with the ``cells`` of a TeX row."""
     found = []
     for title, cell in zip(header, cells, strict=True):
         shown = _plain(cell)
@@ -131,20 +131,20 @@ def _agreeing(table: pd.DataFrame, header: Sequence[str], cells: Sequence[str]) 
 
 
 def _linked_cell(cell: str, key: str) -> str:
-    """Return ``cell``; its number (all of the cell or its end) links to the table rows ``key``."""
+    """Return ``cell`` with a link from its number (whole cell or end) to the rows ``key``."""
     if _NUMBER.fullmatch(cell):
         return _link(key, cell)
     return _TAIL.sub(lambda found: found[1] + _link(key, found[2]) + found[3], cell)
 
 
 def _plain(cell: str) -> str:
-    """Text of a cell without backslashes; if it begins with ``\\texttt{x}``, only the x."""
+    """Return a cell without backslashes; if it begins with ``\\texttt{x}``, only the x."""
     name = re.match(r"\\texttt\{([^{}]*)\}", cell)
     return (name[1] if name else cell).replace("\\", "")
 
 
 def plain_columns(text: str) -> str:
-    """Reduce the column definitions of all tables in ``text`` to letters that pandoc can read."""
+    """Reduce the column definitions of all tables in ``text`` to letters that pandoc reads."""
     pieces, start = [], 0
     for found in _SPEC.finditer(text):
         begin, end = found.end() + 1, closing(text, found.end() + 1)

@@ -1,4 +1,4 @@
-"""Functions on pandoc's syntax tree: they make nodes, number sections and figures, set links."""
+"""Edit pandoc's syntax tree: make nodes, number sections and figures, resolve references."""
 
 import re
 from collections import Counter
@@ -33,7 +33,7 @@ def words(text: str) -> list[Node]:
 def link(inlines: list[Node], address: str, classes: str = "") -> Node:
     """Return the node of a link to an ``address`` whose shown nodes are ``inlines``.
 
-    If they are a formula, its text becomes the title of the link, for screen readers.
+    If ``inlines`` are a formula, its text becomes the title of the link, for screen readers.
     """
     formula = all(node["t"] == "Math" for node in inlines)
     title = re.sub(r"\\cdot ?|[{}\\]", lambda m: "·" if "cdot" in m[0] else "", plain(inlines))
@@ -41,7 +41,7 @@ def link(inlines: list[Node], address: str, classes: str = "") -> Node:
 
 
 def plain(node: Any) -> str:
-    """Text of a node, or of a list of nodes, without formatting."""
+    """Return the text of a node, or of a list of nodes, without formatting."""
     if isinstance(node, list):
         return "".join(map(plain, node))
     if not isinstance(node, dict):
@@ -55,7 +55,7 @@ def plain(node: Any) -> str:
 
 
 def changed(node: Any, visit: Callable[[Node], Any]) -> Any:
-    """Return a tree in which ``visit`` has replaced nodes by one or a list, or kept them (None)."""
+    """Replace each node by the node or list that ``visit`` returns; None keeps the node."""
     if isinstance(node, list):
         made: list[Any] = []
         for each in node:
@@ -73,12 +73,12 @@ _LABEL = re.compile(r"\\label\{([^{}]*)\}")
 _EQUATION = re.compile(r"\\begin\{(equation|align)\}")
 _CLAIM = re.compile(r"(\W*)(C\d+)\b(.*)")
 _COLOUR = re.compile(r"color: (ok\w+)")
-PARAGRAPH = 4  # level of the heading that pandoc makes of LaTeX's \paragraph
+PARAGRAPH = 4  # heading level that pandoc gives to LaTeX's \paragraph
 
 
 @dataclass
 class Labels:
-    """Counters of the figures, tables etc. of one document, and the numbers of its TeX labels.
+    """Counters of figures, tables etc. of one document, and the numbers of all TeX labels.
 
     prefix, page : prefix of all numbers, such as "S", and file name of the document's page
     numbers : TeX label -> (number, page)
@@ -111,7 +111,7 @@ class Labels:
 def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> Node:
     """Number sections, figures, tables, equations and theorems of ``tree``; lay them out for HTML.
 
-    ``labels`` get the number of every TeX label; ``shown`` replaces a figure's name and node.
+    ``labels`` receive the numbers of TeX labels; ``shown`` replaces the name and node of a figure.
     """
 
     def visit(node: Node) -> Any:
@@ -130,7 +130,7 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
             title = {"t": "Header", "c": [1, attributes("references"), words("References")]}
             return [title, node]
         if kind == "Div" and (which := {"theorem", "proposition"} & set(content[0][1])):
-            # pandoc's number lacks the document's prefix: replace it in the theorem's heading
+            # pandoc's number in the theorem's heading lacks the document's prefix: replace it
             content[1][0]["c"][0]["c"][-1]["c"] = labels.next(which.pop(), content[0][0])
         if kind == "Math" and content[0]["t"] == "DisplayMath":
             return _equation(node, labels)
@@ -140,7 +140,7 @@ def numbered(tree: Node, labels: Labels, shown: Callable[[str, Node], Node]) -> 
 
 
 def _table(label: str, node: Node, labels: Labels) -> Node:
-    """Return the table ``node`` in a region that can be scrolled; its caption is above."""
+    """Return the table ``node`` in a region that can be scrolled, below its caption."""
 
     def headed(node: Node) -> Node | None:
         """Return a formula followed by its TeX for screen readers; None for any other node."""
@@ -161,7 +161,7 @@ def _heard(text: str) -> Node:
 
 
 def _captioned(node: Node, opening: str) -> Node:
-    """Return a figure or table whose caption begins with ``opening`` (such as "Table 3.")."""
+    """Return a figure or table with ``opening`` (such as "Table 3.") before its caption."""
     attribute, (short, blocks), *others = node["c"]
     strong, first = {"t": "Strong", "c": words(opening)}, blocks[0]["c"] if blocks else []
     opened = {"t": "Plain", "c": [strong, {"t": "Space"}, *first]}
@@ -169,7 +169,7 @@ def _captioned(node: Node, opening: str) -> Node:
 
 
 def _equation(node: Node, labels: Labels) -> Node:
-    """Return a display formula with its number; an ``align`` environment has one for each line."""
+    """Return a display formula with its number, or one number per line of ``align``."""
     kind, tex = node["c"]
     found = _EQUATION.search(tex)
     lines = [] if found is None else [tex] if found[1] == "equation" else tex.split(r"\\")
@@ -185,8 +185,8 @@ def _equation(node: Node, labels: Labels) -> Node:
 def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Node:
     """Turn references, table values and claim names into links; put paragraph headings in line.
 
-    ``labels`` map TeX labels to (number, page); PaperError if the text refers to another one. The
-    keys of ``claims`` are the names of the claims in the text, such as "C4".
+    ``labels`` map TeX labels to (number, page). The keys of ``claims`` are the names of claims in
+    the text, such as "C4". Raises PaperError if the text refers to a label that does not exist.
     """
 
     def visit(node: Node) -> Any:
@@ -205,7 +205,7 @@ def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[
 
 
 def _run_in(blocks: list[Node]) -> list[Node]:
-    """Replace each heading of a paragraph by bold words at the beginning of that paragraph."""
+    """Replace each heading of a paragraph by bold words at the beginning of the paragraph."""
     made: list[Node] = []
     heading: list[Node] = []
     for block in blocks:
@@ -225,7 +225,7 @@ def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | 
     attribute, inlines, (address, _) = node["c"]
     if address.startswith(ORIGIN):
         key = bytes.fromhex(address.removeprefix(ORIGIN)).decode()
-        # the key has a table's name and filters; the table's page shows rows that satisfy them
+        # the key has the name of a table, and filters of the rows that the page of the table shows
         table, _, rows = key.partition("|")
         place = re.sub(r'[% "<>#]', lambda sign: quote(sign[0]), rows)
         return link(inlines, f"tables/{table}.html" + (f"#{place}" if place else ""), "val")
@@ -234,7 +234,7 @@ def _resolved_link(node: Node, labels: Mapping[str, tuple[str, str]]) -> Node | 
         return None
     label = keys["reference"]
     if label not in labels:
-        raise PaperError(f"manuscript: no label {label}, which the text refers to")
+        raise PaperError(f"manuscript: the text refers to label {label}, which does not exist")
     number, page = labels[label]
     shown = f"({number})" if keys["reference-type"] == "eqref" else number
     return link(words(shown), f"{page}#{label}")

@@ -1,1 +1,1 @@
-"""Web page on which reduced models run, with the scripts that draw their motion."""
+"""Web page that simulates reduced models in the browser."""

@@ -1,4 +1,4 @@
-"""Web page on which reduced models run: one HTML file, and a file of models for each scene."""
+"""Web page that simulates reduced models: one HTML file, and a file of models per scene."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +11,7 @@ from study.artifact.reads import Every, ProjectFile
 
 
 def _write(models: list[File], outputs: Mapping[str, str], parts: list[Path]) -> None:
-    """Write the page with a list of the scenes of ``models``, those without any left out."""
+    """Write the page with a list of the scenes for which ``models`` has at least one model."""
     scenes = [
         {"scene": file["scene"], "file": "/".join(Path(file.path).parts[-2:])}
         for file in models
@@ -22,7 +22,7 @@ def _write(models: list[File], outputs: Mapping[str, str], parts: list[Path]) ->
 
 live_page = Artifact(
     "live_page",
-    "Page on which models run",
+    "Page that simulates reduced models",
     {
         "models": Every(LIVE_MODEL),
         "parts": ProjectFile(tuple(f"src/pdrom/view/{name}" for name in LIVE)),

@@ -388,7 +388,7 @@ def test_references_have_the_numbers_of_the_pdf(small, tmp_path):
 def test_a_reference_to_nothing_is_named(tmp_path):
     given, path = write_study(tmp_path), tmp_path / "paper" / "main.tex"
     write_text(path.read_text("utf-8").replace(r"\ref{thm:s}", r"\ref{thm:lost}"), path)
-    with pytest.raises(PaperError, match="no label thm:lost"):
+    with pytest.raises(PaperError, match="label thm:lost, which does not exist"):
         write_pages(given, tmp_path)
     assert not (tmp_path / "article" / "index.html").exists()
 
@@ -456,5 +456,5 @@ def test_the_page_of_a_table_shows_the_rows_of_a_link_and_the_last_verification(
     shutil.copy(small / "article.js", tmp_path)
     cut.write_bytes(whole[: whole.index(b'id="data">') + 40])
     with page_at(cut.as_uri(), 900, 700) as page:
-        page.locator("#asked", has_text="this file was cut").wait_for()
+        page.locator("#asked", has_text="this file was truncated").wait_for()
     write_verified({}, small)
