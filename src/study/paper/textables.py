@@ -1,4 +1,4 @@
-"""TeX tables of the manuscript, each made by a function from tables that its parameters name."""
+"""TeX tables of the manuscript: functions whose parameters name the study's tables they need."""
 
 import math
 import re
@@ -21,20 +21,20 @@ from study.tables.kit.results import FAILED, MEASURES, MEDIAN, over_motions, tra
 
 NONE, TINY = "--", 1e-6
 LEFT = r">{\raggedright\arraybackslash}"
-NUMBER = r">{\raggedleft\arraybackslash}p{1.5cm}"  # column whose head may have several lines
+NUMBER = r">{\raggedleft\arraybackslash}p{1.5cm}"  # column whose header may have several lines
 # Iterator over a table: first (column definitions, header), then the rows; all cells are TeX.
 Rows = Iterator[Any]
-# Tables that may break across pages.
+# TeX tables that may break across pages.
 LONG = ("tab_scenes", "tab_trajectories", "tab_frontier")
-FULL = "full"  # value of column position_basis for runs with unreduced positions
+FULL = "full"  # value of column position_basis for runs whose positions are not reduced
 
 
 def tabular(
     header: Sequence[str], rows: Sequence[Sequence[str]], columns: str, long: bool = False
 ) -> str:
-    r"""TeX table: ``header`` between rules, then ``rows``; ``columns`` has the column types.
+    r"""Return a TeX table with ``header`` and ``rows``; ``columns`` has the column types.
 
-    If ``long``, it may break across pages; the source defines its caption as ``\captionrow``.
+    A ``long`` table may break across pages; the source defines its caption as ``\captionrow``.
     """
     head, kind = [r"\hline", _line(header), r"\hline"], "longtable" if long else "tabular"
     if long:
@@ -75,7 +75,7 @@ def _known(value: Any, form: Callable[[Any], str] = format_number) -> str:
 
 
 def _not_tiny(value: float) -> str:
-    """Format an error; one below a millionth only as such."""
+    """Format an error; errors below a millionth only as smaller than this."""
     return format_number(value) if value >= TINY else "$<10^{-6}$"
 
 
@@ -86,7 +86,7 @@ def _rows(table: pd.DataFrame, **wanted: object) -> pd.DataFrame:
 
 
 def _cell(rows: pd.DataFrame, shown: Callable[[pd.Series], Any]) -> str:
-    """Text or number that ``shown`` takes from the first row; a dash if ``rows`` is empty."""
+    """Format the cell that ``shown`` takes from the first row; a dash if ``rows`` is empty."""
     found = shown(rows.iloc[0]) if len(rows) else NONE
     return found if isinstance(found, str) else format_number(found)
 
@@ -107,7 +107,7 @@ def _verdict(text: str) -> str:
 def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
     """Claims: verdicts on the preprint's and on the improved method, counts of agreeing cases.
 
-    A verdict that differs if the deformation error counts, too, stands beside the other.
+    If the deformation error changes a verdict, the cell has the changed verdict, too.
     """
     tests = claims_tests[claims_tests.decides.astype(bool)]
     columns = rf"l{LEFT}p{{4.6cm}}{LEFT}p{{3.2cm}}{LEFT}p{{4.1cm}}l"
@@ -130,18 +130,18 @@ def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
         yield [row.claim, escape(row.paper), *cells, place]
 
 
-# Change, kind of mesh and words of each row of the table of paired comparisons.
+# Change, kind of mesh and row title of each row of the table of paired comparisons.
 _CHANGES = (
     ("three elements a mode for one", "sheets", "three elements per mode instead of one, sheets"),
     ("three elements a mode for one", "bars", "three elements per mode instead of one, bars"),
     ("shared coefficients, single rows", "sheets", "one system for all coordinates, sheets"),
     ("shared coefficients, single rows", "bars", "one system for all coordinates, bars"),
-    ("whole elements, shared coefficients", "all", "whole elements instead of scattered rows"),
+    ("whole elements, shared coefficients", "all", "element-wise sampling instead of single rows"),
 )  # fmt: skip
 
 
 def interventions(gain_interventions: pd.DataFrame) -> Rows:
-    """Paired comparisons: ratios of the DEIM constant and of the error, rescued simulations."""
+    """Paired comparisons: ratios of DEIM constants and of errors, simulations that stop failing."""
     header = ["change", "constant", "error", "interval", "decreases in", "rescued"]
     yield "lrrrrr", header
     for step, mesh, change in _CHANGES:
@@ -159,7 +159,7 @@ def interventions(gain_interventions: pd.DataFrame) -> Rows:
 
 
 def square(gain_interventions: pd.DataFrame) -> Rows:
-    """Failing simulations and median errors by number of systems and of sampled elements."""
+    """Failing simulations and median errors, by number of systems and of sampled elements."""
     yield "lrrrrr", ["", "one: failing", "error", "three: failing", "error", "three to one"]
     for mesh in ("sheets", "bars"):
         for kind in ("separate", "shared"):
@@ -175,7 +175,7 @@ def square(gain_interventions: pd.DataFrame) -> Rows:
 
 
 def claims_in_full(claims_tests: pd.DataFrame) -> Rows:
-    """Tests that decide a verdict: limit, number of rows within it, range of the tested values."""
+    """Tests that decide a verdict: limit, rows that satisfy it, range of the tested values."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
     header = ["", "test", "limit", "rows", "least", "median", "most"]
     yield rf"{LEFT}p{{1.9cm}}{LEFT}p{{5.6cm}}rrrrr", header
@@ -192,7 +192,7 @@ def claims_in_full(claims_tests: pd.DataFrame) -> Rows:
 
 
 def replications(replication: pd.DataFrame) -> Rows:
-    """Verdicts of the study and of each replication; a dash where none is decided."""
+    """Verdicts of the study and of each replication; a dash where no verdict was decided."""
     names = list(replication.replication.unique())
     heads = [cell for part in _PARTS.values() for cell in (f"{part}: study", *names)]
     yield "l" * (1 + len(heads)), ["", *heads]
@@ -209,7 +209,7 @@ _RUNS = (("fom", 1), ("fom", 5), ("fom", 10), ("fom", 40), ("fom-anderson", 10))
 
 
 def iterations(accuracy_cost: pd.DataFrame) -> Rows:
-    """Full-order runs with K iterations: error against a run with converged frames, frame time."""
+    """Full-order runs with K iterations: error against converged steps, and time per frame."""
 
     def text(run: pd.Series) -> str:
         error, time = map(format_number, (run.relative_error_within_horizon, run.ms_per_frame))
@@ -228,7 +228,7 @@ _TOLERANCE = "ecsw-1e-02"
 
 
 def positions(reduced_reruns: pd.DataFrame) -> Rows:
-    """Errors and speed-ups of runs in position subspaces, for the largest dimension k per scene."""
+    """Errors and speed-ups of runs in position subspaces of the largest dimension k per scene."""
 
     def unseen(run: pd.Series) -> str:
         same = {column: run[column] for column in ("scene", "method", "k", "position_basis")}
@@ -264,7 +264,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
     yield f"ll{2 * 'r'}{2 * NUMBER}{NUMBER}", ["scene", "reduction", "speed-up", *heads]
     for row in speedups.itertuples():
         size = f"r = {int(row.r)}" if row.position_basis == FULL else f"k = {int(row.k)}"
-        frames = row.frames_to_break_even  # frames until time saved repays training; 2 digits shown
+        frames = row.frames_to_break_even  # frames after which saved time exceeds training time
         yield [
             _scene(row.scene),
             f"{escape(words.method(row.method))}, ${size}$",
@@ -274,7 +274,7 @@ def speedups(speedups: pd.DataFrame) -> Rows:
         ]
 
 
-# Basis of the positions, method and words of each row of the table of accurate simulations.
+# Position basis, method and row title of each row of the table of accurate simulations.
 _COMPARED = (
     (FULL, "fewer-iterations", "full-order model, fewer iterations"),
     (FULL, "coarser-mesh", "full-order model, coarser mesh"),
@@ -290,7 +290,7 @@ _COMPARED = (
 
 
 def payoff(payoff: pd.DataFrame) -> Rows:
-    """Numbers of cases in which a method is accurate, and faster than the full-order model."""
+    """Numbers of cases in which a method is accurate, and in which it is faster than the FOM."""
     header = ["method", "cases", "accurate", "on test trajectories", "faster", "speed-up"]
     yield "lrrrrr", header
     for basis, method, title in _COMPARED:
@@ -301,11 +301,11 @@ def payoff(payoff: pd.DataFrame) -> Rows:
             yield [title, *counts, test, _known(row.pays, _whole), _known(row.best_speedup)]
 
 
-APART = 2.0  # least ratio of the validation errors of two neighbours in the table frontier
+APART = 2.0  # smallest ratio of validation errors of successive rows of the table frontier
 
 
 def _setting(row: Any) -> str:
-    """Words for a row of the table frontier: mesh or model, iterations, training."""
+    """Describe a row of the table frontier: mesh or model, iterations, training."""
     if pd.isna(row.method):
         return NONE
     solve = "converged" if pd.isna(row.iterations) else f"$K = {_whole(row.iterations)}$"
@@ -322,8 +322,8 @@ def _setting(row: Any) -> str:
 def frontier(frontier: pd.DataFrame) -> Rows:
     """Best reduced models and coarser meshes of a scene, chosen on validation trajectories.
 
-    Settings with a validation error above 10 %, or hardly below that of the row before, are left
-    out.
+    Settings with a validation error above 10 %, or more than half of the error in the row before,
+    are left out.
     """
     header = ["scene", "setting", "validation", "test", "time", "training", "ahead"]
     yield "llrrrrr", header
@@ -357,7 +357,7 @@ def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
 
 
 def trajectories(test_trajectories: pd.DataFrame) -> Rows:
-    """Test trajectories: how far from rigid and affine, errors of replay, full order, reference."""
+    """Test trajectories: non-rigid and non-affine parts, errors of replay, FOM, reference."""
     columns = {
         "rigid": "deformation", "affine": "affine", "replay": "replay_error",
         "shape": "replay_deformation_error", "full order": "full_order_error",
@@ -370,7 +370,7 @@ def trajectories(test_trajectories: pd.DataFrame) -> Rows:
 
 
 def error_budget(error_budget: pd.DataFrame) -> Rows:
-    """Error budget: median deformation error of the test trajectories by part, and largest part."""
+    """Error budget: median deformation error of test trajectories by part, and largest part."""
     parts = ["iterations" if part == "run" else part.replace("_", " ") for part in PARTS]
     yield "lr" + "r" * (len(parts) + 1), ["scene", "columns", *parts, "largest"]
     for (scene, k, skinning), own in error_budget.groupby(["scene", "k", "skinning"], sort=False):
@@ -388,7 +388,7 @@ def methods(methods: pd.DataFrame) -> Rows:
     for row in methods.itertuples():
         least = "one" if row.oversampling == 1 else row.oversampling
         bound = row.gain_bound
-        samples = f"{least} a mode" if pd.isna(bound) else rf"$\gamma \le {bound:g}$"
+        samples = f"{least} per mode" if pd.isna(bound) else rf"$\gamma \le {bound:g}$"
         chosen = [NONE, NONE] if row.rows == "all" else [row.selection, samples]
         own = escape(words.method(row.method, row.title))
         titles = [own, _name(row.method), row.centring, row.rows]
@@ -396,7 +396,7 @@ def methods(methods: pd.DataFrame) -> Rows:
 
 
 def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
-    """Relative error of each method at its largest basis size r, over frames before the horizon."""
+    """Relative error of each method at its largest basis size r, up to the horizon."""
 
     def text(run: pd.Series) -> str:
         if not pd.isna(run.relative_error_within_horizon):
@@ -420,9 +420,9 @@ _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
 
 
 def stability(stability: pd.DataFrame) -> Rows:
-    """Numbers of runs by method and outcome, and their energies relative to the full-order run.
+    """Numbers of runs by method and outcome, and energies relative to the full-order run.
 
-    The last two columns are about short runs with other time steps h or stiffness.
+    The last two columns summarise short runs with other time steps h or other stiffness.
     """
     full_order = (stability.method == "full") & (stability.position_basis == FULL)
     table = stability[(stability.outcome != "not run") & ~full_order]
@@ -454,7 +454,7 @@ TEX_TABLES: dict[str, Callable[..., Rows]] = {
 
 
 def reads(name: str) -> list[str]:
-    """Names of the study's tables from which the TeX table ``name`` is made."""
+    """Return the names of the study's tables from which the TeX table ``name`` is made."""
     return list(signature(TEX_TABLES[name]).parameters)
 
 

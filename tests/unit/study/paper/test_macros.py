@@ -21,7 +21,7 @@ Next. \known{{Both: {BAR}, {CLOTH}.}}
 
 @pytest.mark.parametrize("source", [r"\known{open {x}", r"\known{a \known{b} c}"])
 def test_faulty_blocks_are_named(source):
-    with pytest.raises(PaperError, match=r"another one|not closed"):
+    with pytest.raises(PaperError, match=r"contains another|not closed"):
         tex.sentences(source)
 
 

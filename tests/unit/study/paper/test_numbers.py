@@ -67,7 +67,7 @@ def test_numbers_by_hand(asked, expected):
         (entry("error", table="run"), r"own: no table 'run'.*runs"),
         (entry("errr"), r"own: table 'runs' has no column 'errr'.*error"),
         (entry("error", scen="b"), r"own: table 'runs' has no column 'scen'.*scene"),
-        (entry("error", scene="b"), "own.* matches 2 rows of table 'runs'"),
+        (entry("error", scene="b"), "own.* 2 rows of 'runs' match; add"),
     ],
 )
 def test_a_faulty_entry_is_named(asked, message):

@@ -171,8 +171,8 @@ bar a & 40 & 0.12 & 0.50 & -- & -- & -- & closure 1 \\
 bar a & 40 + 40 & 0.75 & 0.75 & -- & -- & -- & span 1 \\
 % methods
 orthogonal projection & \texttt{pod} & none & all & -- & -- & square \\
-50 \% & \texttt{deim\_x} & affine & scalar & greedy & 3 a mode & qr \\
-c & \texttt{y} & affine & scalar & greedy & one a mode & qr \\
+50 \% & \texttt{deim\_x} & affine & scalar & greedy & 3 per mode & qr \\
+c & \texttt{y} & affine & scalar & greedy & one per mode & qr \\
 d & \texttt{z} & affine & scalar & greedy & $\gamma \le 2.5$ & qr \\
 % the largest size that ran: without ranks beyond the data, and subspaces
 % reruns
