@@ -53,9 +53,9 @@ def curves(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
     timed=True,
 )  # fmt: skip
 def accuracy_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """In this scene interpolation from three elements per mode is faster than full-order simulation
-    with fewer iterations and the same error; where larger errors are allowed, reduced positions and
-    coarser meshes are faster still. Each mark is a setting: its time per frame, and its position
+    """In this scene interpolation from three elements per mode is faster than the full-order model
+    with as few iterations as give the same error; at larger errors, reduced positions and coarser
+    meshes are faster still. Each mark is a setting: its time per frame, and its position
     error on the training trajectory up to the predictability horizon, relative to the converged
     step. Settings are basis sizes $r$ (interpolated projections), numbers of iterations $K$ (black:
     full-order model), and the best combinations of modes and tolerance (reduced positions) or of
@@ -117,7 +117,7 @@ def alternatives(table: pd.DataFrame) -> Figure:
     figure, axes = small_multiples(len(cases), beside, legend_rows=3, height=1.9)
     for (labels, case), ax in zip(cases, axes, strict=True):
         _draw_case(ax, labels, case)
-    label_outer(axes, beside, "time / plain frame", y="position error")
+    label_outer(axes, beside, "time / time of ten iterations", y="position error")
     drawn = BEST | {label: colour for label, (_, colour) in TRAINED.items()}
     lines = [style.handle(BARE, color=style.GREEN, linestyle=":")]
     lines.append(style.handle("replaying the training trajectory", color="#555555", linestyle="--"))

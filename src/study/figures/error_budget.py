@@ -23,7 +23,7 @@ MARK = {"markersize": 4.2, "markeredgewidth": 1.2, "linestyle": "none"}
 RING = {"markersize": 7.0, "markerfacecolor": "none"}  # the closure, around the sampling
 
 
-@figure(title="Where the error of a reduced model arises", reads={"table": TableOf("error_budget")})
+@figure(title="Sources of the error of reduced models", reads={"table": TableOf("error_budget")})
 def error_budget(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Restricting the equations to the subspace (Galerkin closure) and stopping after five
     iterations add most of the error; sampling adds little. Deformation error of the reduced

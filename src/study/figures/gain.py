@@ -33,12 +33,12 @@ _KEYS = ["scene", "group", "method", "r"]
     },
 )  # fmt: skip
 def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
-    """Most simulations with a large DEIM constant fail, few with a small DEIM constant do. This
+    """Most simulations with a large DEIM constant fail; few with a small DEIM constant do. This
     constant bounds how much interpolation amplifies errors. Left: position error up to the
     predictability horizon, relative to the full-order simulation; one mark per simulation with
     interpolated projections whose basis suffices (orthogonal projection onto it does not fail).
-    Simulations above the dashed line failed; arrows point to values outside the axes. Crosses:
-    range and median if training frames are drawn at random. Right: share of failed simulations.
+    Simulations above the dashed line (10 %) failed; arrows point to values outside the axes.
+    Crosses: median and range over random training frames. Right: share of failed simulations.
     """
     runs = drawn.rows(judged_runs(tables["reruns"], tables["errors"]))
     figure = style.new_figure(3.0)
@@ -254,8 +254,8 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
     methods="pod deim deim-joint published block-deim",
 )  # fmt: skip
 def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
-    """On training frames, methods with one system for all coordinates (entry-wise and element-wise
-    DEIM) are nearly as accurate as the orthogonal projection; the preprint's are less accurate.
+    """On training frames, one system for all coordinates (entry-wise and element-wise DEIM) is
+    nearly as accurate as the orthogonal projection; the preprint's methods are less accurate.
     Relative error of projections reconstructed from samples against the number $r$ of basis
     vectors: for training frames, for the frames between them, and for the first test trajectory.
     Grey: output of the preprint's code for a similar scene. Arrow heads: errors above the axis.

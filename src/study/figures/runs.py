@@ -156,7 +156,7 @@ def obstacles_of(experiment: Experiment, positions: np.ndarray) -> list[Mesh] | 
 
 
 @figure(
-    title="Bars with reduced projections", more=COMPARED, reads=RUNS,
+    title="Bars: reduced projections", more=COMPARED, reads=RUNS,
     scenes="bar_release bar_twist torus_release starfish_twist", methods=PAIR,
     groups=" ".join(VOLUMES),
 )  # fmt: skip
@@ -166,7 +166,7 @@ def bar_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
 
 
 @figure(
-    number=6, title="Springs only, reduced", more=COMPARED, reads=RUNS,
+    number=6, title="Springs only: reduced projections", more=COMPARED, reads=RUNS,
     scenes="spring_stretch spring_twist ball_shell", methods=PAIR, groups="spring",
 )  # fmt: skip
 def spring_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
@@ -175,7 +175,7 @@ def spring_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
 
 
 @figure(
-    number=7, title="Triangle strain only, reduced", more=COMPARED, reads=RUNS,
+    number=7, title="Triangle strain only: reduced projections", more=COMPARED, reads=RUNS,
     scenes="strain_stretch strain_twist strain_poke disc_strain", methods=PAIR,
     groups="strain area",
 )  # fmt: skip
@@ -185,7 +185,7 @@ def strain_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
 
 
 @figure(
-    number=5, title="Bending only, reduced",
+    number=5, title="Bending only: reduced projections",
     reads={**RUNS, "noise": TableOf("noise"), "noise_runs": Every(NOISE_RUNS)},
     scenes="bend_fall bend_poke bend_curved", methods=PAIR, groups="bending",
 )  # fmt: skip

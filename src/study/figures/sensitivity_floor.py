@@ -52,8 +52,8 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
     """In some scenes a tiny change of the initial positions grows until two full-order simulations
     disagree. Relative difference of two full-order simulations whose initial positions differ by
     {sensitivity.reference} of the size of the body, by frame. The predictability horizon of a scene
-    (dot) is the first frame at which the difference exceeds {sensitivity.threshold} (grey line);
-    beyond it (dotted) simulations of the scene are not evaluated.
+    (dot) is the first frame at which the difference exceeds {sensitivity.threshold} (grey line). We
+    evaluate no simulation beyond it (dotted). Scenes without a dot are predictable to their end.
     """
     floors = floors_of(sensitivity, horizon)
     scenes = [scene for scene in drawn.scenes if len(floors[scene][0])][:MOST]
@@ -72,7 +72,7 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
         ax.plot(*points[last - 1 :].T, ":", color=colour, linewidth=1.0)
         if end is not None:
             ax.plot(*points[end], "o", color=colour, markersize=5.0, zorder=5)
-        found = "predictable to the end" if end is None else f"horizon at frame {end}"
+        found = "predictable" if end is None else f"horizon {end}"
         labelled.append((f"{words.scene(scene)}: {found}", colour, points[:: len(points) // 8 + 1]))
     ax.set(xlabel="frame", ylabel="relative difference")
     text = "dotted: beyond the horizon, not evaluated"

@@ -230,8 +230,8 @@ def test_errors_above_the_axis_are_marked_on_its_rim(study):
 def test_the_horizon_is_the_first_frame_above_the_threshold(study):
     figure = study.draw("sensitivity_floor", scenes=("spring_twist", "strain_oop"))
     # 10^(-9 + f/2) exceeds 1e-3 first at f = 13
-    assert "twisted sheet, springs: horizon at frame 13" in texts(figure)
-    assert "hanging sheet, strain: predictable to the end" in texts(figure)
+    assert "twisted sheet, springs: horizon 13" in texts(figure)
+    assert "hanging sheet, strain: predictable" in texts(figure)
     solid, dotted = figure.axes[0].lines[1:3]
     assert [len(solid.get_xdata()), dotted.get_xdata()[0]] == [14, 13]
 
