@@ -88,7 +88,7 @@ async function showTable(name) {
     const about = column === null ? null : $("columns").querySelector(`tr[data-column="${CSS.escape(column)}"]`);
     const gone = [column, ...filters.map(([name]) => name)].filter((name) => name !== null && ![...head, "row"].includes(name));
     const [meaning, unit, kind, tolerance] = [...(about?.cells ?? [])].slice(1).map((cell) => cell.textContent);
-    $("column").textContent = about ? `${column}: ${meaning}${unit && `, ${unit}`}. Comparison by verify: ${kind}; tolerance: ${tolerance}.`
+    $("column").textContent = about ? `${column}: ${meaning}${unit && `, ${unit}`}. Compared by verify as ${kind}; tolerance: ${tolerance}.`
       : gone.length ? `This table has no column ${gone.join(", ")}.` : "";
     show();
   };
@@ -129,7 +129,7 @@ async function showTable(name) {
 }
 
 function showVerified(place, name) {
-  place.textContent = window.pdromVerified?.[name] ?? "not run";
+  place.textContent = window.pdromVerified?.[name] ?? "not yet run";
 }
 
 for (const place of document.querySelectorAll("[data-verified]")) showVerified(place, place.dataset.verified);

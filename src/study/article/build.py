@@ -169,7 +169,7 @@ def _rule(rule: TestRule) -> str:
     where = "; ".join(
         f"{column}: {', '.join(map(str, values))}" for column, values in rule.where.items()
     )
-    margin = f"; undecided if within a factor {rule.factor:g} of it" if rule.timed else ""
+    margin = f"; undecided within a factor {rule.factor:g} of this limit" if rule.timed else ""
     return (
         f"<code>{rule.metric}</code> of <a href='tables/{table}.html'>{table}</a>"
         f"{f' ({escape(where)})' if where else ''} "
