@@ -241,7 +241,7 @@ MAP = "src/study/figures/stability_map.py"
             ("config/claims.yaml", "threshold: 0.7", "threshold: 0.71"),
             {f"tables/{name}.csv" for name in CLAIMS},
         ),
-        ((MAP, "leave the scene at nearly every size", "leave it"), set()),
+        ((MAP, "at nearly every basis size", "at most sizes"), set()),
     ],
     ids=["threshold of a claim", "caption"],
 )
