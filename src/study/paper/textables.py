@@ -105,7 +105,7 @@ def _verdict(text: str) -> str:
 
 
 def claims(claims_tests: pd.DataFrame, claims: pd.DataFrame) -> Rows:
-    """Claims: verdicts on the preprint's and on the improved method, counts of agreeing cases.
+    """Tabulate claims: verdicts on the preprint's and improved method, counts of agreeing cases.
 
     If the deformation error changes a verdict, the cell has the changed verdict, too.
     """
@@ -141,7 +141,7 @@ _CHANGES = (
 
 
 def interventions(gain_interventions: pd.DataFrame) -> Rows:
-    """Paired comparisons: ratios of DEIM constants and of errors, simulations that stop failing."""
+    """Tabulate paired comparisons: ratios of DEIM constants and errors, rescued simulations."""
     header = ["change", "constant", "error", "interval", "decreases in", "rescued"]
     yield "lrrrrr", header
     for step, mesh, change in _CHANGES:
@@ -159,7 +159,7 @@ def interventions(gain_interventions: pd.DataFrame) -> Rows:
 
 
 def square(gain_interventions: pd.DataFrame) -> Rows:
-    """Failing simulations and median errors, by number of systems and of sampled elements."""
+    """Tabulate failing simulations and median errors by number of systems and of sampled elements."""
     yield "lrrrrr", ["", "one: failing", "error", "three: failing", "error", "three to one"]
     for mesh in ("sheets", "bars"):
         for kind in ("separate", "shared"):
@@ -175,7 +175,7 @@ def square(gain_interventions: pd.DataFrame) -> Rows:
 
 
 def claims_in_full(claims_tests: pd.DataFrame) -> Rows:
-    """Tests that decide a verdict: limit, rows that satisfy it, range of the tested values."""
+    """Tabulate tests that decide verdicts: limit, rows that satisfy it, range of the values."""
     tests = claims_tests[claims_tests.decides.astype(bool)]
     header = ["", "test", "limit", "rows", "least", "median", "most"]
     yield rf"{LEFT}p{{1.9cm}}{LEFT}p{{5.6cm}}rrrrr", header
@@ -192,7 +192,7 @@ def claims_in_full(claims_tests: pd.DataFrame) -> Rows:
 
 
 def replications(replication: pd.DataFrame) -> Rows:
-    """Verdicts of the study and of each replication; a dash where no verdict was decided."""
+    """Tabulate verdicts of the study and of replications; a dash where no verdict is decided."""
     names = list(replication.replication.unique())
     heads = [cell for part in _PARTS.values() for cell in (f"{part}: study", *names)]
     yield "l" * (1 + len(heads)), ["", *heads]
@@ -209,7 +209,7 @@ _RUNS = (("fom", 1), ("fom", 5), ("fom", 10), ("fom", 40), ("fom-anderson", 10))
 
 
 def iterations(accuracy_cost: pd.DataFrame) -> Rows:
-    """Full-order runs with K iterations: error against converged steps, and time per frame."""
+    """Tabulate full-order runs with K iterations: error against converged steps, frame time."""
 
     def text(run: pd.Series) -> str:
         error, time = map(format_number, (run.relative_error_within_horizon, run.ms_per_frame))
@@ -228,7 +228,7 @@ _TOLERANCE = "ecsw-1e-02"
 
 
 def positions(reduced_reruns: pd.DataFrame) -> Rows:
-    """Errors and speed-ups of runs in position subspaces of the largest dimension k per scene."""
+    """Tabulate errors and speed-ups in position subspaces of the largest dimension k per scene."""
 
     def unseen(run: pd.Series) -> str:
         same = {column: run[column] for column in ("scene", "method", "k", "position_basis")}
@@ -259,7 +259,7 @@ def positions(reduced_reruns: pd.DataFrame) -> Rows:
 
 
 def speedups(speedups: pd.DataFrame) -> Rows:
-    """Speed-ups that the text cites, with confidence intervals, errors and costs of training."""
+    """Tabulate speed-ups that the text cites, with intervals, errors and costs of training."""
     heads = "full ms", "training", "tests", "repaid"
     yield f"ll{2 * 'r'}{2 * NUMBER}{NUMBER}", ["scene", "reduction", "speed-up", *heads]
     for row in speedups.itertuples():
@@ -290,7 +290,7 @@ _COMPARED = (
 
 
 def payoff(payoff: pd.DataFrame) -> Rows:
-    """Numbers of cases in which a method is accurate, and in which it is faster than the FOM."""
+    """Tabulate in how many cases a method is accurate, and faster than the full-order model."""
     header = ["method", "cases", "accurate", "on test trajectories", "faster", "speed-up"]
     yield "lrrrrr", header
     for basis, method, title in _COMPARED:
@@ -320,7 +320,7 @@ def _setting(row: Any) -> str:
 
 
 def frontier(frontier: pd.DataFrame) -> Rows:
-    """Best reduced models and coarser meshes of a scene, chosen on validation trajectories.
+    """Tabulate best reduced models and coarser meshes, chosen on validation trajectories.
 
     Settings with a validation error above 10 %, or more than half of the error in the row before,
     are left out.
@@ -342,7 +342,7 @@ def frontier(frontier: pd.DataFrame) -> Rows:
 
 
 def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
-    """Scenes: name in the code, groups, mesh size, frames, first frame that is not predictable."""
+    """Tabulate scenes: name in the code, groups, mesh size, frames, first unpredictable frame."""
     horizon = trained(reduced_reruns).groupby("scene").horizon_frame.first()
     header = ["scene", "name", "groups (weight)", "vertices", "elements", "frames", "horizon"]
     yield rf"ll{LEFT}p{{2.5cm}}rrrr", header
@@ -357,7 +357,7 @@ def scenes(reduced_reruns: pd.DataFrame, scenes: pd.DataFrame) -> Rows:
 
 
 def trajectories(test_trajectories: pd.DataFrame) -> Rows:
-    """Test trajectories: non-rigid and non-affine parts, errors of replay, FOM, reference."""
+    """Tabulate test trajectories: non-rigid, non-affine parts; errors of replay, FOM, reference."""
     columns = {
         "rigid": "deformation", "affine": "affine", "replay": "replay_error",
         "shape": "replay_deformation_error", "full order": "full_order_error",
@@ -370,7 +370,7 @@ def trajectories(test_trajectories: pd.DataFrame) -> Rows:
 
 
 def error_budget(error_budget: pd.DataFrame) -> Rows:
-    """Error budget: median deformation error of test trajectories by part, and largest part."""
+    """Tabulate median deformation errors of test trajectories by part, and the largest part."""
     parts = ["iterations" if part == "run" else part.replace("_", " ") for part in PARTS]
     yield "lr" + "r" * (len(parts) + 1), ["scene", "columns", *parts, "largest"]
     for (scene, k, skinning), own in error_budget.groupby(["scene", "k", "skinning"], sort=False):
@@ -383,7 +383,7 @@ def error_budget(error_budget: pd.DataFrame) -> Rows:
 
 
 def methods(methods: pd.DataFrame) -> Rows:
-    """Reduction methods: centring, rows, choice and number of samples, solver for coefficients."""
+    """Tabulate methods: centring, rows, choice and number of samples, solver for coefficients."""
     yield "lllllll", ["method", "name", "centring", "rows", "selection", "samples", "solve"]
     for row in methods.itertuples():
         least = "one" if row.oversampling == 1 else row.oversampling
@@ -396,7 +396,7 @@ def methods(methods: pd.DataFrame) -> Rows:
 
 
 def reruns(reduced_reruns: pd.DataFrame, methods: pd.DataFrame) -> Rows:
-    """Relative error of each method at its largest basis size r, up to the horizon."""
+    """Tabulate the relative error of each method at its largest basis size, up to the horizon."""
 
     def text(run: pd.Series) -> str:
         if not pd.isna(run.relative_error_within_horizon):
@@ -420,7 +420,7 @@ _OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up")
 
 
 def stability(stability: pd.DataFrame) -> Rows:
-    """Numbers of runs by method and outcome, and energies relative to the full-order run.
+    """Tabulate runs by method and outcome, and energies relative to the full-order run.
 
     The last two columns summarise short runs with other time steps h or other stiffness.
     """
