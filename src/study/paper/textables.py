@@ -159,7 +159,7 @@ def interventions(gain_interventions: pd.DataFrame) -> Rows:
 
 
 def square(gain_interventions: pd.DataFrame) -> Rows:
-    """Tabulate failing simulations and median errors by number of systems and of sampled elements."""
+    """Tabulate failing simulations and median errors by numbers of systems and elements."""
     yield "lrrrrr", ["", "one: failing", "error", "three: failing", "error", "three to one"]
     for mesh in ("sheets", "bars"):
         for kind in ("separate", "shared"):
