@@ -1,4 +1,4 @@
-"""Tables of the study, one module for each subject; `study.tables.kit` has what they share."""
+"""Tables of the study, one module for each subject; shared code is in `study.tables.kit`."""
 
 from study.tables.kit.declaration import declared
 

@@ -1,9 +1,9 @@
-"""Tables of error and time: each method and size, where reductions save time.
+"""Tables of error and time of each method and size, and of reductions that save time.
 
-Errors are taken against the run with converged frames (K -> infinity local/global iterations).
-Method ``full`` without a position subspace is the full-order run with the scene's own K, ``fom``
-one with another K, ``fom-anderson`` one with Anderson acceleration, ``coarser-mesh`` and
-``coarser-mesh-anderson`` are the same on a coarser mesh.
+Errors are taken against the run with converged frames (K -> infinity local-global iterations).
+Method ``full`` with full positions is the full-order run with the scene's K, ``fom`` that with
+another K, ``fom-anderson`` that with Anderson acceleration; ``coarser-mesh`` and
+``coarser-mesh-anderson`` are the last two on a coarser mesh.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,14 +23,14 @@ _POINT = [ERROR, "ms_per_frame"]
 
 
 @table(
-    title="Every method and size as a point of accuracy and cost",
+    title="Error and frame time of every method and size",
     only_with_error=True,
     columns=(
         *shared("scene group method position_basis k r"),
-        integer("iterations", "local/global iterations of a frame"),
-        integer("vertices", "vertices of the mesh that is simulated"),
+        integer("iterations", "local-global iterations of a frame"),
+        integer("vertices", "number of vertices of the simulated mesh"),
         *shared("relative_error_within_horizon deformation_error ms_per_frame"),
-        timed(flag("pareto", "no point of the scene is as good in error and time, better in one")),
+        timed(flag("pareto", "no row of the scene is as good in error and time and better in one")),
         *shared("reference reference_error reference_deformation_error mesh_error"),
         *results.COLUMNS,
         *shared("velocity_error energy_drift"),
@@ -49,7 +49,7 @@ def accuracy_cost(
 ) -> pd.DataFrame:  # fmt: skip
     """One row for each full-order run, and for each reduced run with a time and an error.
 
-    Velocities and energies are compared with the full-order run of the scene's own iterations.
+    Velocities and energies are compared with the full-order run with the scene's iterations.
     """
     times = results.timings_in_one_time(timings, frame_times)
     times = times[times.implementation == "compiled"]
@@ -85,27 +85,27 @@ def _sweep(errors: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     return points.assign(position_basis="full", k=None, r=None)
 
 
-# Columns that identify a curve (time of the local step over size r); its rows differ only in r.
+# Columns that identify a curve (time of the local step over size r); rows of a curve differ in r.
 CURVE = ["scene", "group", "method", "factor"]
-SHARE = 1e-3  # table payoff omits groups with at most this share of all forces in a scene
+SHARE = 1e-3  # table payoff omits groups with at most this share of the forces in a scene
 
 
 @table(
-    title="Reduced local steps against the full one, and where they stop paying",
+    title="Reduced local steps: times, and the size from which they are slower than the full step",
     columns=(
         *shared("scene group method factor vertices elements r"),
         timed(number("local_ms", "time of the reduced local step", "ms")),
-        timed(number("full_ms", "time of the full local step of the group", "ms")),
-        timed(number("ratio", "the first over the second")),
-        timed(integer("breakeven_r", "size from which the reduction costs more, of the curve")),
-        timed(number("solve_ratio", "the solve alone over the full local step")),
-        timed(number("lift_ratio", "the reconstruction alone over the full local step")),
+        timed(number("full_ms", "time of the full local step of this group", "ms")),
+        timed(number("ratio", "reduced time over full time")),
+        timed(integer("breakeven_r", "size r from which the reduced local step is slower")),
+        timed(number("solve_ratio", "time of the solve over that of the full local step")),
+        timed(number("lift_ratio", "time of the reconstruction over full time")),
     ),
     reads={"own": Every(paths.BREAK_EVEN), "sized": Every(paths.BREAK_EVEN_SIZED)},
 )
 def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
     """One row per scene, group, method, mesh and size r: local-step times, and `break_even`."""
-    # a factor of 1 would be the scene's own mesh again
+    # Files with a factor of 1 repeat the scene's mesh.
     rows = results.joined([*own, *(file for file in sized if file["factor"] != "1")])
     if rows.empty:
         return rows
@@ -121,8 +121,8 @@ def breakeven(own: list[paths.File], sized: list[paths.File]) -> pd.DataFrame:
 def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
     """Smallest size from which on the reduced local step costs at least as much as the full one.
 
-    The ratio of both times at each size ``r`` (ascending) is interpolated linearly after the last
-    size with a ratio below one. Return None if that is the largest, the smallest if there is none.
+    ``ratio``, the ratio of these times at each size ``r`` (ascending), is interpolated after the
+    last size with a ratio below 1. Return None if this is the last size, the first if none is.
     """
     sizes, values = np.asarray(r, dtype=float), np.asarray(ratio, dtype=float)
     below = np.flatnonzero(values < 1.0)
@@ -135,29 +135,29 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
 
 
 @table(
-    title="Where reductions pay and where they lose to the full order",
+    title="Reductions that are faster than the full-order model, and those that are slower",
     columns=(
         text(
-            "measure", "errors that have to be within a limit: position, or both (deformation, too)"
+            "measure", "errors that must be within the limit: position, or both (deformation, too)"
         ),
         *shared("reference position_basis method"),
         count(
-            "scenes", "scenes (and groups) with a timed run, whose reference is known well enough"
+            "scenes", "cases: scenes and groups with a timed run and an accurate reference"
         ),
-        count("accurate", "those with a run whose errors are at most a tenth"),
-        timed(integer("pays", "those among them with an accurate run faster than the full order")),
-        timed(integer("loses", "those whose accurate runs are all slower")),
-        timed(number("best_speedup", "median over them of the fastest accurate run's speed-up")),
-        timed(number("least_speedup", "the smallest of them")),
-        timed(number("most_speedup", "the largest of them")),
-        timed(number("error_train", "median over all, of the fastest accurate run or the best")),
-        timed(number("error_heldout", "median of the same runs held out, each over its motions")),
-        integer("heldout", "scenes (and groups) with a held-out motion"),
-        timed(number("error_heldout_low", "median of the least error of each over its motions")),
-        timed(number("error_heldout_high", "median of the largest")),
+        count("accurate", "cases with a run whose errors are at most 10 %"),
+        timed(integer("pays", "cases with an accurate run that is faster than the full-order run")),
+        timed(integer("loses", "cases whose accurate runs are all slower")),
+        timed(number("best_speedup", "median speed-up of the fastest accurate runs")),
+        timed(number("least_speedup", "smallest speed-up of these runs")),
+        timed(number("most_speedup", "largest speed-up of these runs")),
+        timed(number("error_train", "median error over cases, of the fastest accurate or the best run")),
+        timed(number("error_heldout", "median error of these runs on test trajectories")),
+        integer("heldout", "cases with a test trajectory"),
+        timed(number("error_heldout_low", "median over runs of the least error in a test")),
+        timed(number("error_heldout_high", "median over runs of the largest error in a test")),
         *shared("playback_error"),
-        count("accurate_heldout", "those whose most accurate size has at most a tenth held out"),
-        timed(integer("pays_heldout", "those that pay whose run has at most a tenth held out")),
+        count("accurate_heldout", "cases whose most accurate size has at most 10 % error in tests"),
+        timed(integer("pays_heldout", "faster cases whose run has at most 10 % error in tests")),
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),
@@ -168,11 +168,11 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
 def payoff(reruns: pd.DataFrame, points: pd.DataFrame, effects: pd.DataFrame) -> pd.DataFrame:
     """One row per position basis and method, which summarises its timed runs of all scenes.
 
-    For each scene and group, a size is chosen in the training motion (that of the fastest accurate
-    run, or else of the most accurate run) and evaluated on held-out motions. Groups with at most
-    `SHARE` of all forces in a scene are left out. The first rows are the full order with fewer
-    iterations and on coarser meshes (from ``points``), which need no training. Motions whose
-    converged run is not known well enough are left out.
+    For each scene and group, a size is chosen on the training trajectory (that of the fastest
+    accurate run, or else of the most accurate run) and evaluated on test trajectories. The first
+    rows are full-order runs with fewer iterations and on coarser meshes (from ``points``), which
+    need no training. Groups with at most `SHARE` of the forces in a scene are left out, and
+    trajectories without an accurate reference.
     """
     weak = effects[effects.force_share <= SHARE].rename(columns={"effect": "group"})
     found = []
@@ -196,7 +196,7 @@ def _summaries(
         speed, faster = fastest.speedup, fastest.speedup > 1.0
         best = own.sort_values(ERROR, kind="stable").groupby(EXPERIMENT).head(1)
         seen = best[best.error_heldout.notna()]
-        # one run per scene and group, accurate or not: medians of all methods cover the same groups
+        # One run per scene and group, accurate or not, so that all medians cover the same groups.
         every = pd.concat([fastest, best[~(best[ERROR] <= FAILED)]])
         yield {
             "position_basis": basis,

@@ -1,4 +1,4 @@
-"""Errors and times of projective dynamics, of alternative solvers and of reductions."""
+"""Table of errors and times of projective dynamics, alternative solvers and reduced models."""
 
 from dataclasses import replace
 from functools import partial
@@ -14,45 +14,45 @@ from study.tables.kit import results
 from study.tables.kit.declaration import estimate, flag, integer, number, shared, table, text, timed
 from study.tables.kit.results import Rows
 
-ITERATIONS = integer("iterations", "iterations of each substep; empty: as many as converge")
+ITERATIONS = integer("iterations", "iterations of each substep; empty: until convergence")
 MOTION = text("motion", f"test trajectory, one of: {', '.join(MOTIONS)}")
-CASE = ["scene", "factor", "stiffness", "motion"]  # columns of a test trajectory in a scene
-KEYS = [*CASE, *settings.SETTING]  # and of a setting in it
-PLAIN, TEN = "projective", 10  # method and iterations that times are compared with
+CASE = ["scene", "factor", "stiffness", "motion"]  # columns that identify a test trajectory
+KEYS = [*CASE, *settings.SETTING]  # columns that identify a run: a setting on it
+PLAIN, TEN = "projective", 10  # method and iterations of the run that times refer to
 
-# Makes a column of errors, whose relative difference between machines is larger: rounding errors
-# decide which steps the two-level methods reject.
+# Makes a column of errors with a larger tolerance between machines, as rounding errors change
+# which steps the two-level methods reject.
 error = partial(number, tolerance=0.3)
 
 
 @table(
-    title="Error and time of the alternatives to projective dynamics",
+    title="Error and time of projective dynamics and its alternatives",
     columns=(
         *shared("scene factor"),
-        integer("vertices", "vertices of the mesh that is simulated"),
+        integer("vertices", "number of vertices of the simulated mesh"),
         *shared("stiffness"),
         text(
             "method",
-            f"how a frame is solved; {settings.CONVERGED}: to a tolerance; {PLAYBACK}: the "
-            "recorded training trajectory is shown; coarser-mesh: by plain iterations on a coarser "
-            "mesh, -anderson: accelerated; ecsw: by a reduced model, -newton: to a tolerance",
+            f"solver of a frame; `{settings.CONVERGED}`: to a tolerance; `{PLAYBACK}`: none, "
+            "replays the training trajectory; `coarser-mesh`: iterations on a coarser mesh, "
+            "`-anderson`: accelerated; `ecsw`: reduced model, `-newton`: to a tolerance",
         ),
-        integer("substeps", "steps that a frame is divided into"),
+        integer("substeps", "number of steps into which a frame is divided"),
         ITERATIONS,
         *shared("training_motions"),
-        timed(number("offline_s", "processor time of its training, full-order runs included", "s")),
+        timed(number("offline_s", "processor time of training, with full-order runs", "s")),
         *shared("k skinning"),
-        number("tolerance", "sampling tolerance of its elements", compared="exact"),
+        number("tolerance", "tolerance of the element sampling", compared="exact"),
         *shared("elements_sampled training_residual"),
         replace(MOTION, meaning=f"{MOTION.meaning}, or a validation trajectory"),
-        integer("frames", "frames that errors are taken over"),
-        flag("finite", "no frame blew up", compared="error"),
+        integer("frames", "number of frames over which errors are taken"),
+        flag("finite", "no frame of the run blew up", compared="error"),
         *shared("ms_per_frame vertices_ms time_ratio vertices_ratio offline_ratio"),
-        integer("processes", "processes that timed it in this trajectory"),
-        error("error_implicit", "against the converged step"),
+        integer("processes", "number of processes that timed the run"),
+        error("error_implicit", "position error against the converged step"),
         error("deformation_error", "deformation error against the converged step"),
-        estimate("implicit_error", "of the converged step, by a much finer solve"),
-        estimate("implicit_deformation_error", "of its shapes"),
+        estimate("implicit_error", "position error of the converged step, by a finer solve"),
+        estimate("implicit_deformation_error", "deformation error of the converged step"),
         *shared("mesh_error"),
         results.DAY,
     ),
@@ -82,7 +82,7 @@ def beside(
 ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     """Return ``rows`` with the column ``vertices_ms``, their frame times, and those of `PLAIN`.
 
-    Both frames of times (ms) have a column for each timing process and the index of the rows.
+    The two data frames of times (ms) have a column per timing process and the index of the rows.
     """
     wide = times.set_index([*KEYS, "process"]).ms_per_frame.unstack("process")
     wide["vertices_ms"] = times.groupby(KEYS, dropna=False).vertices_ms.median()

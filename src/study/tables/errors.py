@@ -1,10 +1,10 @@
 """Tables of errors: of reconstructions, of perturbed runs, and of runs with one changed choice.
 
-The gain is the factor by which sampling amplifies errors. Table gain_interventions shows whether
-the error of a run falls if only its gain is lowered: each step compares two methods with one basis
-and size r that differ in their samples, or in whether the axes x, y and z share coefficients. If
-separate coefficients raise errors only by their gain, errors must also fall with the gain between
-methods that all have separate, or all shared ones (`KINDS`).
+The DEIM constant (column gain) bounds the factor by which sampling amplifies errors. Table
+gain_interventions shows whether the error of a run falls if only this constant is lowered. Each
+step compares two methods with the same basis and size r and other samples, or with separate in
+place of shared coefficients of x, y and z. If separate coefficients raised errors only by the
+constant, errors would also fall with it among methods of the same kind of coefficients (`KINDS`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,8 +22,8 @@ from study.tables.kit import declaration, results
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, text
 from study.tables.kit.results import Rows
 
-_SMALL = "empty at round-off level"
-# Errors of approximations amplify rounding errors less than runs do, 7e-4 at most was measured.
+_SMALL = "empty: only rounding errors"
+# Rounding errors change errors of approximations less than those of runs: by at most 7e-4.
 _approximation = partial(number, compared="value", tolerance=0.005)
 _CELL = ["scene", "group", "method", "r", "varied"]
 
@@ -33,11 +33,11 @@ _CELL = ["scene", "group", "method", "r", "varied"]
     columns=(
         *shared("scene group"),
         integer("component", "number of the mode, from 1"),
-        number("singular_value", "of the snapshot matrix", "that of the group's projections"),
-        number("relative", "over the first one"),
-        flag("above_roundoff", "larger than the rounding errors of the projections"),
+        number("singular_value", "of the snapshot matrix", "unit of the group's projections"),
+        number("relative", "singular value over the first one"),
+        flag("above_roundoff", "singular value exceeds the rounding errors of the projections"),
     ),
-    # each group's `USUAL_BASIS` (no weights, not centred) if the study makes it, else its first one
+    # The basis of a group is its `USUAL_BASIS` (no weights, not centred) if the study has it.
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
 )
 def singular_values(bases: list[paths.File]) -> pd.DataFrame:
@@ -56,11 +56,11 @@ def singular_values(bases: list[paths.File]) -> pd.DataFrame:
     title="Reconstruction error of every method and size",
     columns=(
         *shared("scene group method r"),
-        text("split", "snapshots that are reconstructed: train, test, heldout"),
-        _approximation("relative_error", f"of the projections; {_SMALL}"),
-        *(_approximation(f"relative_error_{a}", f"of {a}-coordinates; {_SMALL}") for a in "xyz"),
+        text("split", "snapshots that are reconstructed: train, test (frames between), heldout"),
+        _approximation("relative_error", f"relative error of the projections; {_SMALL}"),
+        *(_approximation(f"relative_error_{a}", f"error of {a}-coordinates; {_SMALL}") for a in "xyz"),
         *shared("gain"),
-        integer("rows_sampled", "rows of the projections that are evaluated", compared="value"),
+        integer("rows_sampled", "number of evaluated rows of projections", compared="value"),
         *shared("elements_sampled"),
     ),
     reads={"rows": Rows(paths.RECONSTRUCTION)},
@@ -71,12 +71,12 @@ def reconstruction_error(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 @table(
-    title="Drift of perturbed full-order runs",
+    title="Relative difference of perturbed full-order runs",
     columns=(
         *shared("scene"),
-        text("perturbation", "of the start, over the extent; or what else was changed"),
+        text("perturbation", "initial displacement over the extent, or the change of the run"),
         integer("frame", "number of the frame, from 0"),
-        number("relative_difference", "largest over the seeds", compared="error"),
+        number("relative_difference", "difference to the original run, largest over seeds", compared="error"),
     ),
     reads={"rows": Rows(paths.SENSITIVITY)},
 )
@@ -87,47 +87,47 @@ def sensitivity(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 @table(
-    title="Runs on bases of round-off",
+    title="Reduced runs with bases of rounding errors",
     columns=(
         *shared("scene group"),
         text(
             "noisy_axes",
-            "what the start's round-off reaches: all axes; of a flat mesh its plane, or this and "
-            "the axis across it at one vertex",
+            "axes with rounding errors at the start: all; the plane of a flat mesh; or this plane "
+            "and, at one vertex, the axis normal to it",
         ),
-        integer("seed", "of the start's round-off"),
+        integer("seed", "seed of the rounding errors at the start"),
         *shared("method r"),
-        integer("rank", "modes that the snapshots have without a cutoff", compared="value"),
-        # modes made of round-off, and thus their gain (error amplification), depend on the machine
+        integer("rank", "number of modes of the snapshots, without a cutoff", compared="value"),
+        # Modes made of rounding errors, and thus their DEIM constant, depend on the machine.
         replace(*shared("gain"), compared="skipped"),
         *shared("frames finite blowup_frame reference"),
-        number("relative_error", "error of the positions over all frames up to the horizon"),
+        number("relative_error", "position error before the horizon"),
     ),
     reads={"rows": Rows(paths.NOISE)},
 )
 def noise(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the ``rows`` of all scenes and groups: runs with bases made of round-off."""
+    """Return the ``rows`` of all scenes and groups."""
     return rows.assign(reference=declaration.ITERATIONS)
 
 
 @table(
-    title="Repeated runs: other training frames, moved starts",
+    title="Runs repeated with other training frames or perturbed initial positions",
     columns=(
         *shared("scene group method r"),
-        text("varied", "training (frames), start; held-out motions, with the number trained on"),
-        integer("repetitions", "runs; their range encloses the median of all but by 2^(1 - n)"),
-        integer("ended", "runs that ended early, with an infinite error", compared="error"),
+        text("varied", "training (frames), start; or n training trajectories, run on tests"),
+        integer("repetitions", "number n; the true median is in their range with p = 1 - 2^(1-n)"),
+        integer("ended", "number of runs that blew up, with an infinite error", compared="error"),
         *shared("reference"),
-        number("error_median", "median of the errors of the positions before the horizon"),
+        number("error_median", "median position error before the horizon"),
         *declaration.extremes("error"),
-        number("gain_median", "median of the gains"),
+        number("gain_median", "median `gain` of all runs"),
         *declaration.extremes("gain"),
-        number("spread", "largest error over least", compared="error"),
+        number("spread", "largest error over least error", compared="error"),
     ),
     reads={"rows": Rows(paths.REPETITIONS)},
 )
 def repetitions(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row per scene, group, method, r and ``varied``: in what repeated runs differ."""
+    """One row per scene, group, method, r and ``varied``, which names the varied quantity."""
     cells = rows.assign(infinite=np.isinf(rows.error)).groupby(_CELL, sort=False)
     ends = {"median": "median", "low": "min", "high": "max"}
     found = {f"{n}_{end}": (n, how) for n in ("error", "gain") for end, how in ends.items()}
@@ -137,25 +137,25 @@ def repetitions(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 @table(
-    title="From the published choices to sound ones, one at a time",
+    title="Ablation from the choices of the published code to those of the improved method",
     columns=(
         *shared("scene group"),
         text(
             "direction",
-            "up from published choices, down from sound ones, signs of the modes, square: "
-            "coefficients by samples",
+            "up: from the published code; down: from the improved method; signs: of the modes; "
+            "square: kinds of coefficients and samples combined",
         ),
-        text("rung", "choice that changes on this rung"),
-        integer("rows_per_element", "rows of an element"),
-        integer("entries", "sampled entries that determine the coefficients", compared="value"),
+        text("rung", "choice that the ablation step changes"),
+        integer("rows_per_element", "number of rows of an element"),
+        integer("entries", "number of entries that determine the coefficients", compared="value"),
         *shared("r"),
         number("condition", "condition number of the sampled modes"),
         *shared("gain"),
         number("error_train", "reconstruction error of the training snapshots"),
-        number("error_heldout", "the same of the held-out motion"),
+        number("error_heldout", "reconstruction error of a test trajectory"),
         *shared("finite blowup_frame reference relative_error_within_horizon"),
-        integer("repetitions", "runs trained on other frames, where they were repeated"),
-        number("error_median", "median of their errors; inf for a run that ended early"),
+        integer("repetitions", "number of runs trained on other frames"),
+        number("error_median", "median error of these runs; inf: a run blew up"),
         *declaration.extremes("error"),
         *declaration.extremes("gain"),
     ),
@@ -172,7 +172,7 @@ STEPS = {
     "three elements a mode for one": ("block-deim", "gappy"),
 }
 # Change -> methods of table ladder before and after it: shared coefficients for x, y and z, or more
-# samples (whole elements are compared with single rows only if elements have several rows).
+# samples (elements are compared with single rows only if elements have several rows).
 _SAMPLES = "single rows", "whole elements", "three elements"
 SQUARE = {
     **{f"shared coefficients, {own}": (f"{own}, separate", f"{own}, shared") for own in _SAMPLES},
@@ -182,7 +182,7 @@ SQUARE = {
         for kind in ("separate", "shared")
     },
 }
-# Step -> methods; of any two, that with the larger error amplification (gain) is "before" the step.
+# Step -> methods; of any two, that with the larger DEIM constant is "before" the step.
 KINDS = {
     "lower gain, shared coefficients": ("deim", "block-deim", "gappy"),
     "lower gain, separate coefficients": ("deim-joint", "published"),
@@ -190,32 +190,32 @@ KINDS = {
 _PLACE = ["scene", "group", "r"]
 VOLUMES = ("deformation_gradient", "tetrahedron_strain", "volume")  # groups on tetrahedra
 MESHES = "all", "sheets", "bars"
-# Constructs a column of numbers that summarise many runs, with the tolerance of "share" columns.
+# Makes a column of numbers that summarise many runs, with the tolerance of "share" columns.
 share = partial(number, compared="share")
 
 
 @table(
-    title="What the error does when the gain is lowered and the basis stays",
+    title="Changes of the error if the DEIM constant is lowered and the basis is the same",
     columns=(
-        text("step", f"one of: {', '.join([*STEPS, *SQUARE, *KINDS])}"),
+        text("step", f"change, one of: `{', '.join([*STEPS, *SQUARE, *KINDS])}`"),
         text("mesh", f"meshes of the pairs: {', '.join(MESHES)}"),
         text("method_before", "method before the step"),
-        text("method_after", "method after it, on the same basis"),
-        count("pairs", "scenes, groups and sizes at which both methods ran"),
-        count("scenes", "scenes among them"),
-        count("failing", "pairs whose error before exceeds a tenth"),
-        count("rescued", "pairs among these whose error after does not"),
-        count("failing_after", "pairs whose error after exceeds a tenth"),
-        share("error_before", "median of the error before; inf for a run that ended early"),
-        share("error_after", "median of the error after"),
+        text("method_after", "method after the step, with the same basis"),
+        count("pairs", "scenes, groups and sizes with runs of the two methods"),
+        count("scenes", "number of scenes of the pairs"),
+        count("failing", "pairs whose error before exceeds 10 %"),
+        count("rescued", "failing pairs whose error after is at most 10 %"),
+        count("failing_after", "pairs whose error after exceeds 10 %"),
+        share("error_before", "median error before the step; inf: a run blew up"),
+        share("error_after", "median error after the step"),
         *shared("reference"),
-        share("gain_ratio", "median of the gain after over that before"),
-        share("error_ratio", "median of the error of the run after over that before"),
+        share("gain_ratio", "median ratio of the DEIM constants, after over before"),
+        share("error_ratio", "median ratio of the errors, after over before"),
         *declaration.interval("error_ratio_low error_ratio_high", share),
-        share("p_value", "two-sided sign test over all families, for which a tie is no fall"),
-        count("families", "families among the scenes: a scene and its twin"),
-        count("families_fallen", "those whose median error ratio is below one"),
-        share("unexplained_share", "pairs of which one falls, the other not"),
+        share("p_value", "two-sided sign test over families; a tie counts as no decrease"),
+        count("families", "number of families: a scene and its short variant are one"),
+        count("families_fallen", "families whose median error ratio is below 1"),
+        share("unexplained_share", "share of pairs in which only constant or only error decreases"),
     ),
     reads={
         "reruns": TableOf("reduced_reruns"),
@@ -226,11 +226,11 @@ share = partial(number, compared="share")
 def gain_interventions(
     reruns: pd.DataFrame, reconstruction: pd.DataFrame, ladder: pd.DataFrame
 ) -> pd.DataFrame:
-    """One row for each step (change of method that lowers the gain) and kind of mesh.
+    """One row for each step (change of method that lowers the DEIM constant) and kind of mesh.
 
-    A scene and its variant ("twin") are a family: the bootstrap resamples families, the sign test
-    counts them. Errors below the sensitivity floor are raised to it. A run that ended early has an
-    infinite error; two such runs are not compared.
+    A scene and its short variant are a family: the bootstrap resamples families, the sign test
+    counts them. Errors below the sensitivity floor are raised to it. A run that blew up has an
+    infinite error; two runs that blew up are not compared.
     """
     runs = results.judged_runs(reruns, reconstruction)
     rows = []
@@ -271,7 +271,7 @@ def _square(ladder: pd.DataFrame, runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
-    """Pairs of runs by two methods: errors, and ratios ``after`` / ``before`` of gain and error."""
+    """Pairs of runs of two methods: errors, ratios ``after`` / ``before`` of constant and error."""
     error = np.maximum(runs.error, runs.sensitivity_floor)
     runs = runs[[*_PLACE, "method", "gain"]].assign(error=error)
     one, other = (runs[runs.method == m].drop(columns="method") for m in (before, after))
@@ -283,13 +283,13 @@ def _pairs(runs: pd.DataFrame, before: str, after: str) -> pd.DataFrame:
 
 
 def _summary(pairs: pd.DataFrame) -> Mapping[str, float]:
-    # not imported at the top: SciPy's import takes a second, which planning the workflow saves
+    # Imported here because the import takes a second and planning the workflow does not need SciPy.
     from scipy.stats import binomtest
 
     by_family = pairs.groupby(pairs.scene.str.removesuffix(results.TWIN)).error
     fallen = int((by_family.median() < 1.0).sum())
     values = [own.to_numpy(float) for _, own in by_family]
-    # bootstrap of the median error ratio: families of scenes are drawn with replacement
+    # Bootstrap of the median error ratio: families of scenes are drawn with replacement.
     size = results.RESAMPLES, len(values)
     drawn = np.random.default_rng(results.SEED).integers(len(values), size=size)
     medians = [np.median(np.concatenate([values[i] for i in row])) for row in drawn]

@@ -1,4 +1,4 @@
-"""Tables of the test trajectories, and of what keeps a reduced model from following them."""
+"""Tables of the test trajectories, and of the sources of error of reduced models on them."""
 
 import numpy as np
 import pandas as pd
@@ -10,57 +10,57 @@ from study.tables.kit import declaration, results
 from study.tables.kit.declaration import flag, integer, number, shared, table, text
 from study.tables.kit.results import Rows
 
-MOTION = text("motion", f"how it differs from the training one: {', '.join(MOTIONS)}")
+MOTION = text("motion", f"test trajectory, one of: {', '.join(MOTIONS)}")
 
 
 @table(
-    title="Test trajectories: how far from rigid, and from the training",
+    title="Distance of test trajectories from rigid motions and from the training",
     columns=(
         *shared("scene"),
         MOTION,
-        integer("frames", "frames of the run", compared="exact"),
+        integer("frames", "number of frames of the run", compared="exact"),
         *shared("horizon_frame"),
         number(
             "deformation",
-            "norm of what the best rigid motions of the rest shape leave of the converged run, "
-            "over the norm of the displacement, in all frames",
+            "distance of the converged run from the best rigid motions of the rest shape, over "
+            "the norm of the displacement, all frames",
         ),
-        number("affine", "the same, if the best affine motions are taken out", compared="error"),
+        number("affine", "as deformation, for the best affine maps of the rest shape", compared="error"),
         *shared("reference"),
         number("replay_error", "position error if the training trajectory is replayed instead"),
-        number("replay_deformation_error", "deformation error of the replay"),
-        number("full_order_error", "position error of the run with the scene's iterations"),
-        number("full_order_deformation_error", "its deformation error"),
+        number("replay_deformation_error", "deformation error if it is replayed"),
+        number("full_order_error", "position error with the scene's iterations"),
+        number("full_order_deformation_error", "deformation error of that run"),
         *shared("reference_error reference_deformation_error"),
-        number("evaluations", "evaluations of a frame of the converged run", compared="error"),
+        number("evaluations", "solver evaluations per frame, converged run", compared="error"),
     ),
     reads={"rows": Rows(paths.REFERENCES)},
 )
 def test_trajectories(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row per scene and held-out motion; errors are before the horizon, of converged runs."""
+    """One row per scene and test trajectory; errors against converged runs, before the horizon."""
     return rows[rows.motion != results.TRAIN].assign(reference=declaration.CONVERGED)
 
 
 @table(
-    title="Error budget of reduced models",
+    title="Error budget of reduced models: error added by each source",
     columns=(
         *shared("scene"),
         MOTION,
-        integer("k", "POD modes that are asked for; a recording may hold fewer"),
-        integer("skinning", "skinning columns beside them"),
+        integer("k", "requested POD modes; the training trajectory may have fewer"),
+        integer("skinning", "number of skinning columns added to them"),
         *shared("elements_sampled"),
-        integer("frames", "frames that errors are taken over: those before the horizon"),
+        integer("frames", "number of frames before the horizon, over which errors are taken"),
         text(
             "part",
-            "span: best approximation in the subspace; closure: the converged step in it, with all "
-            "elements; sampling: with the sampled ones; run: five local/global iterations; "
-            "full_order: the full order with the scene's iterations",
+            "span: best approximation in the subspace; closure: converged step in the subspace, "
+            "all elements; sampling: with sampled elements; run: five local-global iterations; "
+            "full_order: full-order run with the scene's iterations",
         ),
         *shared("reference"),
         number("error", "position error"),
         *shared("deformation_error"),
-        number("added", "deformation error less that of the part before", compared="error"),
-        flag("largest", "the part adds most, and more than 3 x the reference's own error"),
+        number("added", "deformation error minus that of the part before", compared="error"),
+        flag("largest", "the part adds most, and more than 3 times the reference's error"),
         *shared("reference_error reference_deformation_error"),
     ),
     reads={"rows": Rows(paths.ERROR_BUDGET), "references": Rows(paths.REFERENCES)},
@@ -68,7 +68,7 @@ def test_trajectories(rows: pd.DataFrame) -> pd.DataFrame:
 def error_budget(rows: pd.DataFrame, references: pd.DataFrame) -> pd.DataFrame:
     """One row per test trajectory, model and part; parts of a reduced model follow one another.
 
-    Where the reference moves rigidly, ``added`` is that of the position error.
+    If the reference moves rigidly, ``added`` is a difference of position errors.
     """
     error = rows[results.DEFORMATION].fillna(rows.error).fillna(np.inf)
     before = error.shift().where(rows.part != SPAN, 0.0)

@@ -1,1 +1,1 @@
-"""Helpers for tables: declaration of a table, shared columns, joining of experiment results."""
+"""Helpers for tables: declarations, shared columns, functions that join experiment results."""

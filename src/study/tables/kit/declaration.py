@@ -1,7 +1,7 @@
 """Declaration of a table: its title, columns, inputs, and the function that computes it.
 
-The decorator `table` declares the function that computes it, as those of `study.artifact.artifact`
-do. The data frame that the function returns is brought to the declared columns.
+The decorator `table` turns a function that returns a data frame into a `Table`, which gives the
+frame the declared columns and types.
 """
 
 import re
@@ -23,12 +23,12 @@ from study.artifact.reads import Read
 # limits are based on measurements (docs/decisions/0010-six-kinds.md).
 Quantity = Literal["exact", "value", "error", "share", "timed", "skipped"]
 QUANTITIES: dict[Quantity, str] = {
-    "exact": "names, parameters, sizes, truth values: equal",
-    "value": "well-conditioned numbers, and numbers of samples: relative",
-    "error": "how runs and approximations end: relative, words and frames equal",
-    "share": "shares, correlations and numbers of runs over many: absolute",
-    "timed": "what depends on timing, a compiler or a cache: not judged",
-    "skipped": "rounding errors, and words about other columns: not compared",
+    "exact": "names, parameters, sizes, truth values: must be equal",
+    "value": "well-conditioned numbers, and numbers of samples: relative tolerance",
+    "error": "errors (relative tolerance) and outcomes (equal) of runs and approximations",
+    "share": "shares, correlations and counts over many runs: absolute tolerance",
+    "timed": "values that depend on timing, a compiler or a cache: not judged",
+    "skipped": "rounding errors, and texts about other columns: not compared",
 }
 # Default tolerance of numbers between two machines: absolute for "share", relative for others.
 TOLERANCES: dict[Quantity, float] = {"exact": 1e-8, "value": 1e-4, "error": 0.05, "share": 0.1}
@@ -69,7 +69,7 @@ class Column:
 
     @property
     def within(self) -> float:
-        """Allowed difference between machines: `tolerance` or a default, 0 but for numbers."""
+        """Allowed difference between machines: `tolerance`, or a default (0 except for numbers)."""
         if self.kind == "integer" and self.quantity == "share":
             return 2.0  # of numbers of runs
         default = TOLERANCES.get(self.quantity, 0.0) if self.kind == "number" else 0.0
@@ -84,7 +84,7 @@ class Column:
                 if not self.holds(cell):
                     raise ValueError(f"row {row}: '{' '.join(str(cell).split())[:60]}'")
         if self.kind == "flag":
-            # pandas may have turned True and False into numbers while joining tables
+            # When pandas joins tables, it may turn True and False into numbers.
             flags = [None if pd.isna(value) else bool(value) for value in values]
             values = pd.Series(flags, values.index, dtype=object)
         return values.astype(_DTYPES[self.kind])
@@ -103,7 +103,7 @@ text = partial(Column, "text")
 integer = partial(Column, "integer")
 flag = partial(Column, "flag")
 number = partial(Column, "number")
-# Makes a column that counts runs or scenes; its values may differ a little between machines.
+# Makes a column that counts runs or scenes; counts may differ slightly between machines.
 count = partial(integer, compared="share")
 
 
@@ -115,105 +115,106 @@ def timed(column: Column) -> Column:
 def interval(names: str, make: Callable[..., Column] = number, unit: str = "") -> list[Column]:
     """Return two columns with the 95 % bootstrap interval of the median in the column before."""
     low, high = names.split()
-    meaning = "2.5 % quantile of this median (bootstrap)"
-    return [make(low, meaning, unit), make(high, "97.5 % quantile", unit)]
+    meaning = "2.5 % bootstrap quantile of the median in the column before"
+    return [make(low, meaning, unit), make(high, "97.5 % bootstrap quantile of that median", unit)]
 
 
 def extremes(name: str) -> list[Column]:
     """Return columns ``name_low``, ``name_high``: least and largest ``name`` of repeated runs."""
-    return [number(f"{name}_low", f"least {name}"), number(f"{name}_high", f"largest {name}")]
+    ends = ("low", "least"), ("high", "largest")
+    return [number(f"{name}_{end}", f"{word} `{name}` of all runs") for end, word in ends]
 
 
-# Makes a column of estimated errors of references, whose relative difference was 0.28 at most.
+# Makes a column of estimated errors of references; machines differed by 28 % at most.
 estimate = partial(number, tolerance=0.5)
-# What the column `reference` names: full-order runs with the scene's iterations, converged ones.
+# Values of the column `reference`: full-order runs with the scene's iterations, converged runs.
 ITERATIONS, CONVERGED = "iterations", "converged"
-# Columns that occur in several tables, declared once so that a name has one meaning everywhere.
+# Columns of several tables, declared once so that a name has the same meaning everywhere.
 _SHARED = (
     text("scene", "name of the scene"),
-    text("group", "constraint group whose projections are reduced; all in a position subspace"),
-    text("method", "reduction of the projections; full without one"),
-    text("position_basis", "basis of the positions: pod, skinning, full (unreduced)"),
-    integer("k", "modes of the position basis"),
+    text("group", "constraint group whose projections are reduced; all: positions are reduced"),
+    text("method", "method that reduces the projections; full: they are not reduced"),
+    text("position_basis", "basis of the positions: pod, skinning, or full (not reduced)"),
+    integer("k", "number of modes of the position basis"),
     integer(
         "r",
-        "modes of the projections; in a position subspace the elements evaluated",
+        "number of modes of the projections; of evaluated elements if positions are reduced",
         compared="value",
     ),
-    integer("vertices", "vertices of the mesh"),
-    integer("elements", "elements of the group"),
-    integer("elements_sampled", "elements that are evaluated", compared="value"),
+    integer("vertices", "number of vertices of the mesh"),
+    integer("elements", "number of elements of the group"),
+    integer("elements_sampled", "number of evaluated elements", compared="value"),
     number(
         "training_residual",
-        "residual of the training equations that sampled elements leave, over their right-hand "
-        "sides; the sampling tolerance is its bound",
+        "residual of the training equations with the sampled elements, over their right-hand "
+        "sides; at most the sampling tolerance",
     ),
-    integer("frames", "frames that the run reached", compared="error"),
-    flag("finite", "no frame blew up", compared="error"),
+    integer("frames", "number of frames that the run reached", compared="error"),
+    flag("finite", "no frame of the run blew up", compared="error"),
     integer("blowup_frame", "first frame that blew up", compared="error"),
-    number("max_extent", "largest extent of a frame over that of the start", compared="error"),
-    number("gain", "norm of the inverse of the sampled modes; inf if they are singular"),
+    number("max_extent", "largest extent in any frame over that at the start", compared="error"),
+    number("gain", "DEIM constant: norm of the inverse of the sampled modes; inf: singular"),
     number("energy_ratio", "largest energy over that of the full-order run", compared="error"),
-    number("relative_error", "error of the positions over all frames"),
-    number("relative_error_within_horizon", "error of the positions before the horizon"),
+    number("relative_error", "relative error of the positions, all frames"),
+    number("relative_error_within_horizon", "position error before the horizon"),
     number(
         "deformation_error",
-        "error of the shapes over the same frames, relative to the deformation; empty for a rigid "
-        "reference",
+        "error of the shapes in the frames of the position error, relative to the deformation; "
+        "empty if the reference moves rigidly",
     ),
-    number("error_converged", "error of the positions before the horizon, of the converged run"),
-    number("deformation_converged", "the deformation error against it"),
-    text("reference", f"run that errors refer to: {ITERATIONS} of the scene or {CONVERGED}"),
-    estimate("reference_error", "position error of the converged run itself, by a second solve"),
-    estimate("reference_deformation_error", "its deformation error"),
+    number("error_converged", "position error before the horizon, against the converged run"),
+    number("deformation_converged", "deformation error against the converged run"),
+    text("reference", f"full-order run that errors refer to: the scene's {ITERATIONS} or {CONVERGED}"),
+    estimate("reference_error", "estimated position error of the converged run"),
+    estimate("reference_deformation_error", "estimated deformation error of that run"),
     estimate(
         "mesh_error",
-        "estimated error of the scene's own mesh, by Richardson's rule from three meshes, relative "
-        "to the motion; empty if the observed order is not 0.5 to 3",
+        "estimated error of the scene's mesh, by Richardson's rule from three meshes, relative to "
+        "the displacement; empty if the observed order is not 0.5 to 3",
     ),
     number(
         "playback_error",
-        "error of playback before the horizon: of the recorded training motion in place of the run",
+        "error before the horizon if the training trajectory is replayed instead of the run",
     ),
     number(
         "error_over_extent",
-        "distance of a vertex (root mean square) before the horizon, over the extent",
+        "root-mean-square distance of vertices from the reference before the horizon, over extent",
     ),
     number(
-        "shape_error", "the same with the best rigid motion of each frame taken out: of the shape"
+        "shape_error", "as error_over_extent, without the best rigid motion of each frame"
     ),
     number(
         "velocity_error",
-        "error of the velocities before the horizon, over the norm of those of the full-order run",
+        "error of the velocities before the horizon, over the norm of the full-order velocities",
     ),
     number(
         "energy_drift",
-        "largest difference of the total energy before the horizon, over the largest energy of the "
-        "full-order run, at the start, every fourth frame and, without a horizon, the last frame",
+        "largest difference of total energy to the full-order run, over the largest energy of this "
+        "run; at the start, each fourth frame before the horizon, the last frame without one",
         compared="error",
     ),
-    integer("horizon_frame", "first frame that cannot be judged: the scene's horizon"),
+    integer("horizon_frame", "predictability horizon of the scene: first frame that is not judged"),
     number(
-        "sensitivity_floor", "largest drift of perturbed runs before the horizon", compared="error"
+        "sensitivity_floor", "largest difference of perturbed runs before the horizon", compared="error"
     ),
     timed(number("ms_per_frame", "time of a frame", "ms")),
-    timed(number("vertices_ms", "of it, the positions of all vertices from coordinates", "ms")),
+    timed(number("vertices_ms", "part of the frame time that computes all vertex positions", "ms")),
     timed(number("local_ms", "time of the local step in a frame", "ms")),
     timed(number("global_ms", "time of the global solve in a frame", "ms")),
-    timed(number("speedup", "time of the full-order run over that of this one")),
+    timed(number("speedup", "time of the full-order run over that of this run")),
     *map(timed, interval("speedup_low speedup_high")),
-    timed(number("local_share", "time of projections and right-hand side over the whole frame's")),
-    number("factor", "on the vertices along a side of the scene's own mesh", compared="exact"),
+    timed(number("local_share", "share of projections and right-hand side in the frame time")),
+    number("factor", "vertices along a side, over those of the scene's mesh", compared="exact"),
     number("stiffness", "factor on all weights of the scene", compared="exact"),
-    integer("training_motions", "trajectories that a reduced model is trained on"),
-    integer("skinning", "skinning columns beside its modes"),
+    integer("training_motions", "number of trajectories that train the reduced model"),
+    integer("skinning", "number of skinning columns added to the modes"),
     number(
         "time_ratio",
-        "time of a frame over that of ten plain iterations of projective dynamics on its own mesh",
+        "frame time over that of ten projective-dynamics iterations, scene's mesh",
         timed=True,
     ),
-    timed(number("vertices_ratio", "of it, the positions of all vertices")),
-    timed(number("offline_ratio", "time of its training over that of one plain frame")),
+    timed(number("vertices_ratio", "part of time_ratio that computes all vertex positions")),
+    timed(number("offline_ratio", "training time over the time of a frame with ten iterations")),
 )
 
 
@@ -233,7 +234,7 @@ class Table(Artifact):
 
     timed_cells : function that returns for each row the columns that depend on timing; None if
         these are the same for all rows (columns marked as ``timed``)
-    only_with_error : whether runs that ended too early to have an error are missing in the table
+    only_with_error : whether the table lacks runs that blew up too early to have an error
     """
 
     columns: tuple[Column, ...] = ()
@@ -244,7 +245,7 @@ class Table(Artifact):
     def __call__(self, *arguments: Any, **named: Any) -> pd.DataFrame:
         """Compute the table from its inputs and return it with the declared columns and types.
 
-        A table has no rows if the first of its inputs is a frame without columns: nothing was made.
+        A table has no rows if its first input is a frame without columns (no results exist).
         """
         first = named.get(next(iter(self.reads)), *arguments[:1])
         if isinstance(first, pd.DataFrame) and not len(first.columns):
@@ -264,7 +265,7 @@ class Table(Artifact):
 
     @property
     def timing_columns(self) -> tuple[str, ...]:
-        """Names of columns that depend on timing: they differ even between runs on one machine."""
+        """Names of the columns that depend on timing, which differ from run to run."""
         return tuple(column.name for column in self.columns if column.timed)
 
     def checked(self, table: pd.DataFrame) -> pd.DataFrame:

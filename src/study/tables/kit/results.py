@@ -1,4 +1,4 @@
-"""Helpers for tables: rows of files, times on one scale, choices of runs, medians over motions.
+"""Helpers for tables: read rows, scale times, choose runs, take medians over test trajectories.
 
 A job that times reduced runs of a scene, or runs without an effect, also times its full-order run,
 because machine speed differs between jobs. All times of a job are multiplied by one factor: time of
@@ -25,27 +25,27 @@ ERROR, DEFORMATION = "relative_error_within_horizon", "deformation_error"
 MEDIAN, LOW, HIGH, COUNT = "error_heldout", "error_heldout_low", "error_heldout_high", "motions"
 SHAPE = "deformation_heldout"
 COLUMNS = (
-    number(MEDIAN, "the same error on held-out motions: their median; inf where a run ended"),
-    number(LOW, "the least of them"),
-    number(HIGH, "the largest"),
-    number(SHAPE, "median of their deformation errors; inf where a run ended"),
+    number(MEDIAN, "median position error on test trajectories; inf: a run blew up"),
+    number(LOW, "least position error on test trajectories"),
+    number(HIGH, "largest position error on test trajectories"),
+    number(SHAPE, "median deformation error on test trajectories; inf: a run blew up"),
     integer(
-        COUNT, "held-out motions that were run, have frames before the horizon and are far enough"
+        COUNT, "simulated test trajectories with frames before the horizon, far from the training"
     ),
-    number("playback_error", "median error of playback on these motions, see reduced_reruns"),
+    number("playback_error", "median error if the training trajectory is replayed instead"),
 )
-FAR = 0.3  # relative; held-out motions from which the training run differs less are left out
+FAR = 0.3  # test trajectories whose relative distance to the training is less are left out
 EXPERIMENT = ["scene", "group"]
 MEASURES = POSITION, BOTH = "position", "both"
 OWN_ERRORS = "reference_error", "reference_deformation_error"
-THIRD = 1.0 / 3.0  # largest error of a reference over a limit by which runs are judged
+THIRD = 1.0 / 3.0  # largest allowed error of a reference, over the limit for errors of runs
 ORTHOGONAL = "pod"  # method that evaluates all elements and projects onto the basis orthogonally
 FAILED = 0.1  # a run whose error over the compared frames exceeds this counts as failed
-TWIN = "_twin"  # at the end of the name of a scene's variant; both are a family
+TWIN = "_twin"  # end of the name of a scene's short variant; scene and variant are a family
 
 
 def joined(files: Iterable[File]) -> pd.DataFrame:
-    """Rows of the tables in ``files``, in order; without any rows, a frame without columns."""
+    """Rows of the tables in ``files``, in order; a frame without columns if there are no rows."""
     parts = [part for part in (read_table(file.path) for file in files) if len(part)]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
 
@@ -58,20 +58,20 @@ class Rows(Every):
 
 
 def with_whole_sizes(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return ``rows`` whose sizes k and r are integers, which may be missing, to join by them."""
+    """Return ``rows`` with sizes k and r as nullable integers, by which tables can be joined."""
     return rows.astype({size: "Int64" for size in ("k", "r") if size in rows})
 
 
-DAY = text("recorded", "day on which config/extended.yaml recorded the row; empty: of this run")
+DAY = text("recorded", "day on which config/extended.yaml recorded the row; empty: computed here")
 
 
 def recordable(columns: Sequence[Column]) -> list[str]:
-    """Names of ``columns`` that rows of another machine may have: all but measured times."""
+    """Names of ``columns`` to copy from rows of another machine: all except measured times."""
     return [c.name for c in columns if not (c.timed and c.unit in ("ms", "s"))]
 
 
 def with_recorded(rows: pd.DataFrame, record: list[Path], known: Sequence[Column]) -> pd.DataFrame:
-    """Append rows of ``record`` that ``rows`` lack, with the `recordable` of ``known`` columns."""
+    """Append rows of ``record`` that ``rows`` lack, with the `recordable` columns of ``known``."""
     if not record:
         return rows.assign(recorded=None)
     others = read_table(record[0], result=False).reindex(columns=recordable(known))
@@ -132,26 +132,26 @@ def _rounded(value: float) -> str:
 
 
 def among(rows: pd.DataFrame, others: pd.DataFrame, keys: Sequence[str]) -> np.ndarray:
-    """Boolean array: True for ``rows`` whose cells in the columns ``keys`` a row of others has."""
+    """Boolean array: True for ``rows`` whose cells in columns ``keys`` occur in ``others``."""
     own, known = (pd.MultiIndex.from_frame(e[[*keys]].astype(object)) for e in (rows, others))
     return own.isin(known)
 
 
 def trained(reruns: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the table reduced_reruns (``reruns``) for the training motion."""
+    """Rows of the table reduced_reruns (``reruns``) for the training trajectory."""
     return reruns[reruns.motion == TRAIN]
 
 
 def against_converged(reruns: pd.DataFrame) -> pd.DataFrame:
-    """Rows of ``reruns`` whose errors are those against the converged runs."""
+    """Return ``reruns`` with the errors against the converged runs."""
     errors = {ERROR: reruns.error_converged, DEFORMATION: reruns.deformation_converged}
     return reruns.assign(**errors, reference=CONVERGED)
 
 
 def measured(rows: pd.DataFrame, measure: str) -> pd.DataFrame:
-    """Return ``rows`` whose error is that of the ``measure``: of "both", the larger one.
+    """Return ``rows`` with the position error or, for ``measure`` "both", the larger error.
 
-    It is the position error where there is no deformation error, as the reference moves rigidly.
+    A run has no deformation error if its reference moves rigidly; its position error then counts.
     """
     if measure == POSITION:
         return rows
@@ -160,7 +160,7 @@ def measured(rows: pd.DataFrame, measure: str) -> pd.DataFrame:
 
 
 def judged_by(rows: pd.DataFrame, measure: str, limit: float) -> pd.DataFrame:
-    """Rows that can be judged by ``limit``: own errors of their references are at most a third."""
+    """Rows whose references are accurate enough: their errors are at most a third of ``limit``."""
     own = OWN_ERRORS[: MEASURES.index(measure) + 1]
     errors = rows[[*own]].astype(float)
     known = errors.iloc[:, 0].notna() & ~(errors > THIRD * limit).any(axis=1)
@@ -168,10 +168,10 @@ def judged_by(rows: pd.DataFrame, measure: str, limit: float) -> pd.DataFrame:
 
 
 def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFrame:
-    """Median, least and largest error of each run over its held-out motions, and their number.
+    """Median, least and largest error of each run on test trajectories, and their number.
 
-    A run that ended before the horizon has an infinite error. Left out are sizes above the rank,
-    which cannot run, motions with horizon 0, and those that playback meets up to `FAR`.
+    A run that blew up before the horizon has an infinite error. Left out are sizes above the rank,
+    trajectories with horizon 0, and those that the training trajectory replaces up to `FAR`.
     """
     ran = (reruns.frames > 0) | reruns.blowup_frame.notna()
     tests = (reruns.horizon_frame > 0) & (reruns.playback_error > FAR)
@@ -185,17 +185,17 @@ def over_motions(reruns: pd.DataFrame, keys: Sequence[str] = KEYS) -> pd.DataFra
 
 
 def with_held_out(runs: pd.DataFrame, reruns: pd.DataFrame) -> pd.DataFrame:
-    """Join ``runs`` with their errors over held-out motions, as `over_motions` computes them."""
+    """Join ``runs`` with their errors on test trajectories (`over_motions`)."""
     own = with_whole_sizes(runs).drop(columns="playback_error", errors="ignore")
     return own.merge(over_motions(reruns), on=KEYS, how="left")
 
 
 def judged_runs(reruns: pd.DataFrame, reconstruction: pd.DataFrame) -> pd.DataFrame:
-    """Training-motion runs of sampled methods with unreduced positions and a sufficient basis.
+    """Training runs of sampled methods with unreduced positions and a sufficient basis.
 
     A basis suffices if the run with orthogonal projection at the largest size up to r (a centred
     basis may have one mode less) has an error of at most `FAILED`. The result has the columns of
-    ``reruns``, gain, error (before the horizon; inf if the run blew up) and failed.
+    ``reruns``, and gain, error (before the horizon; inf if the run blew up), failed.
     """
     runs = trained(reruns)
     runs = runs[(runs.position_basis == "full") & runs.max_extent.notna()]
