@@ -141,16 +141,14 @@ def break_even(r: Sequence[int], ratio: Sequence[float]) -> int | None:
             "measure", "errors that must be within the limit: position, or both (deformation, too)"
         ),
         *shared("reference position_basis method"),
-        count(
-            "scenes", "cases: scenes and groups with a timed run and an accurate reference"
-        ),
+        count("scenes", "cases: scenes and groups with a timed run and an accurate reference"),
         count("accurate", "cases with a run whose errors are at most 10 %"),
         timed(integer("pays", "cases with an accurate run that is faster than the full-order run")),
         timed(integer("loses", "cases whose accurate runs are all slower")),
         timed(number("best_speedup", "median speed-up of the fastest accurate runs")),
         timed(number("least_speedup", "smallest speed-up of these runs")),
         timed(number("most_speedup", "largest speed-up of these runs")),
-        timed(number("error_train", "median error over cases, of the fastest accurate or the best run")),
+        timed(number("error_train", "median error over cases: fastest accurate run, or best one")),
         timed(number("error_heldout", "median error of these runs on test trajectories")),
         integer("heldout", "cases with a test trajectory"),
         timed(number("error_heldout_low", "median over runs of the least error in a test")),

@@ -13,7 +13,7 @@ from study.tables.kit.declaration import flag, integer, interval, number, shared
 from study.tables.kit.results import Rows, with_whole_sizes
 
 KEYS = ["scene", "effect"]
-NOTHING = "nothing"  # value of column effect in a row of a scene from which nothing is left out
+NOTHING = "nothing"  # value of column effect in a row of a scene without any effect left out
 PHASE, SEVERAL = "phase", "several"
 IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
 
@@ -24,25 +24,25 @@ IMPLEMENTATIONS = ("interpreted", "numpy", "compiled")
         *shared("scene"),
         text(
             "effect",
-            "name of the effect; right-hand side, global solve and the rest have rows, too, and "
-            f"what is left out together, or {NOTHING}",
+            "effect; phase of a frame (right-hand side, global solve, rest); or effects that are "
+            f"left out together, {NOTHING} without any",
         ),
         text(
             "role",
             "constraint group, force, contact, hold or start; "
-            f"{PHASE}: no effect; {SEVERAL}: left out together",
+            f"{PHASE}: of a frame; {SEVERAL}: effects left out together",
         ),
-        integer("elements", "elements of a group, vertices of another effect"),
+        integer("elements", "number of elements of a group, of vertices of another effect"),
         *shared("ms_per_frame"),
-        timed(number("share", "of the frame; those of a scene add up to one")),
-        integer("groups", "constraint groups of the scene that is built without it"),
-        timed(number("without_ms", "time of a frame of the scene that is built without it", "ms")),
-        number("force", "root mean square over the frames of the norm of its force", "N"),
-        number("force_share", "of the sum over the effects of the scene"),
-        number("energy", "range of the energy that it holds, where it has one", "J"),
-        number("moved", "largest drift of the run without it before the horizon", compared="error"),
+        timed(number("share", "share of the frame time; shares of a scene add up to 1")),
+        integer("groups", "number of constraint groups of the scene without this effect"),
+        timed(number("without_ms", "frame time of the scene without this effect", "ms")),
+        number("force", "root mean square of the norm of its force over the frames", "N"),
+        number("force_share", "its force over the sum for all effects of the scene"),
+        number("energy", "range of the energy of the effect, if it has one", "J"),
+        number("moved", "largest change of positions without it, before horizon", compared="error"),
         *shared("sensitivity_floor"),
-        flag("above_floor", "moved is larger than the sensitivity floor", compared="error"),
+        flag("above_floor", "the change is larger than the sensitivity floor", compared="error"),
     ),
     reads={
         "costs": Rows(paths.EFFECTS),
@@ -59,8 +59,8 @@ def effects_cost(
 ) -> pd.DataFrame:  # fmt: skip
     """One row per effect or phase of a scene, then one per set of effects left out together.
 
-    Column ``moved`` is empty for a scene's only constraint group: no run lacks it. Times are scaled
-    to those in ``frame_times`` (`in_one_time`).
+    Column ``moved`` is empty for the only constraint group of a scene, as every run needs one.
+    Times are scaled to those in ``frame_times`` (`in_one_time`).
     """
     own = costs.groupby("scene").ms_per_frame.sum()
     costs = results.in_one_time(costs, own, frame_times, columns=["ms_per_frame"])
@@ -89,14 +89,14 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
         force=("force", lambda force: float(np.sqrt(np.mean(np.square(force))))),
         energy=("energy", lambda of: float(of.max() - of.min() if len(of) > 1 else of.iloc[0])),
     )
-    # effects that set the start have only a row for frame 0: average their force over all frames
+    # Effects that set the start have a row for frame 0 only. Average their force over all frames.
     length = made.scene.map(frames.groupby("scene").frame.max() + 1)
     made.loc[made.role == "start", "force"] /= np.sqrt(length)
     made["force_share"] = made.force / made.groupby("scene").force.transform("sum")
     ends = horizons(sensitivity, horizon.perturbation, horizon.threshold)
 
     def largest(scene: str, label: float | str) -> float | None:
-        """Largest drift before the horizon of run ``label`` from the original run, or None."""
+        """Largest difference before the horizon of run ``label`` to the original run, or None."""
         drift = floor_of(sensitivity, scene, label)[: ends[scene]]
         return float(drift.max()) if len(drift) else None
 
@@ -111,7 +111,7 @@ def _acting(frames: pd.DataFrame, sensitivity: pd.DataFrame, horizon: Horizon) -
     title="Share of the local step in a full-order frame",
     columns=(
         *shared("scene"),
-        text("implementation", f"of the local step: {', '.join(IMPLEMENTATIONS)}"),
+        text("implementation", f"code of the local step: {', '.join(IMPLEMENTATIONS)}"),
         *shared("vertices local_ms"),
         timed(number("assembly_ms", "time of the right-hand side in a frame", "ms")),
         *shared("global_ms local_share ms_per_frame"),
@@ -131,19 +131,19 @@ def local_share(timings: pd.DataFrame, frame_times: pd.DataFrame) -> pd.DataFram
 
 
 @table(
-    title="Cost of an iteration against the size of the mesh",
+    title="Time of an iteration for different sizes of the mesh",
     columns=(
         *shared("scene"),
-        text("method", f"{FOM} (full order), a reduced local step, or ecsw"),
+        text("method", f"{FOM} (full-order model), method of the reduced local step, or ecsw"),
         *shared("vertices"),
-        integer("elements", "elements of all groups"),
+        integer("elements", "number of elements of all groups"),
         *shared("r k elements_sampled"),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
-        timed(number("local_ms", "time of the local step in an iteration; ecsw: all of it", "ms")),
+        timed(number("local_ms", "time of the local step; ecsw: of the whole iteration", "ms")),
         timed(number("global_ms", "time of the global solve in an iteration; ecsw: 0", "ms")),
         *shared("vertices_ms local_share speedup"),
-        integer("meshes", "sizes of the mesh of the curve"),
-        timed(number("exponent", "of the time of an iteration in the number of vertices")),
+        integer("meshes", "number of mesh sizes with this scene and method"),
+        timed(number("exponent", "exponent of the power law of time over vertices")),
     ),
     reads={"rows": Rows(paths.SCALING)},
 )
@@ -151,7 +151,7 @@ def scaling(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per scene, mesh size and method.
 
     The exponent is fitted in logarithms to all meshes of a scene and method, if there are at least
-    three: any two points fit a power law.
+    three, because any two points fit a power law.
     """
     own = rows[rows.method == FOM].set_index(["scene", "vertices"])
     mesh = pd.MultiIndex.from_frame(rows[["scene", "vertices"]])
@@ -169,7 +169,7 @@ _REDUCTION = ["scene", "group", "method", "r"]
 # As a control, the full-order run is timed twice. Speed-ups are not shown if the two times differ
 # by more than this factor, which was fixed on 2026-11-22, before any control was measured.
 CONFIRMED = 1.5
-ENOUGH = 0.9  # of a processor, or else other programs have disturbed the times
+ENOUGH = 0.9  # share of a processor; with less, other programs have disturbed the times
 UNCONFIRMED = "not confirmed by its control"
 _ERRORS = {name: f"relative_{name}" for name in ("error_train", results.MEDIAN, results.HIGH)}
 _TRAIN = {results.ERROR: "error_train", results.DEFORMATION: "deformation_train"}
@@ -177,17 +177,17 @@ _TIMES = ["ms_per_frame", "vertices_ms", "speedup", "speedup_low", "speedup_high
 
 
 @table(
-    title="Times of full-order frames, with their controls",
+    title="Times of full-order frames, and of repeated timings as a control",
     columns=(
         *shared("scene vertices"),
-        integer("processes", "processes that timed it"),
+        integer("processes", "number of processes that timed the run"),
         *shared("ms_per_frame"),
         *map(timed, interval("low_ms high_ms", unit="ms")),
-        timed(number("control_ratio", "time of the same run, timed once more, over this one")),
+        timed(number("control_ratio", "time of the same run timed again, over this time")),
         *map(timed, interval("control_low control_high")),
-        timed(flag("control_agrees", "the quantiles enclose one")),
-        timed(number("processor_share", "processor time over time, while the process measured")),
-        timed(number("twin_ratio", "time of the scene's twin, the same frames, over this one")),
+        timed(flag("control_agrees", "the interval of control_ratio contains 1")),
+        timed(number("processor_share", "processor time over elapsed time of the process")),
+        timed(number("twin_ratio", "time of the scene's short variant, same frames, over this")),
         *map(timed, interval("twin_low twin_high")),
     ),
     reads={"rows": Rows(paths.FRAME_TIMES)},
@@ -215,20 +215,20 @@ def frame_times(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 @table(
-    title="Speed-ups over several processes, with what they cost",
+    title="Speed-ups measured in several processes, with training times and errors",
     columns=(
         *shared("scene vertices group method position_basis k r"),
-        integer("processes", "processes that timed it"),
-        timed(number("full_ms", "time of a frame of the full-order run", "ms")),
+        integer("processes", "number of processes that timed the run"),
+        timed(number("full_ms", "time of a full-order frame", "ms")),
         *shared("ms_per_frame vertices_ms speedup speedup_low speedup_high"),
-        timed(text("shown", "the median and its quantiles, where the control confirms the times")),
-        timed(flag("loses", "dearer than the full order: the upper quantile is below one")),
+        timed(text("shown", "median speed-up with its interval, if the control confirms it")),
+        timed(flag("loses", "slower than the full-order run: the upper quantile is below 1")),
         timed(number("training_s", "time of the training run", "s")),
         timed(number("reduction_s", "processor time of basis and sampling", "s")),
-        timed(number("frames_to_break_even", "frames that pay both back; none if never")),
+        timed(number("frames_to_break_even", "frames that save both these times; empty: never")),
         *shared("reference"),
-        number("error_train", "of the training motion before the horizon (large: over all)"),
-        number("deformation_train", "deformation error over the same frames"),
+        number("error_train", "training error up to the horizon (large scenes: all frames)"),
+        number("deformation_train", "deformation error in these frames"),
         *results.COLUMNS,
     ),
     reads={
@@ -244,7 +244,7 @@ def speedups(
     measured: pd.DataFrame, times: pd.DataFrame, projections: pd.DataFrame,
     subspaces: pd.DataFrame, large: pd.DataFrame, reruns: pd.DataFrame,
 ) -> pd.DataFrame:  # fmt: skip
-    """One row per timed reduction; speed-ups compare runs of one and the same process."""
+    """One row per timed reduction; speed-ups compare runs of the same process."""
     made = timed_reductions(measured, times)
     if made.empty:
         return made
@@ -318,23 +318,23 @@ def _errors(reruns: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
 
 
 def large_errors(large: pd.DataFrame) -> pd.DataFrame:
-    """Errors over all frames, per model: on the training motion; median, range on held-out ones."""
+    """Errors over all frames, per model: in training; median and range on test trajectories."""
     whole = large.rename(columns={"relative_error": results.ERROR}).assign(horizon_frame=1)
     return _errors(whole, _MODEL)
 
 
 @table(
-    title="Large scenes in position subspaces with sampled elements",
+    title="Large scenes: reduced positions with sampled elements",
     columns=(
         *shared("scene vertices"),
-        integer("elements", "elements of all groups"),
+        integer("elements", "number of elements of all groups"),
         *shared("position_basis k"),
         number("tau", "tolerance of the element sampling", compared="exact"),
         *shared("elements_sampled training_residual reference"),
-        number("relative_error_train", "error of the positions in the training motion"),
-        number("deformation_train", "deformation error there"),
-        number("relative_error_heldout", "the same in held-out motions: their median"),
-        number("relative_error_heldout_high", "the largest"),
+        number("relative_error_train", "position error, training trajectory"),
+        number("deformation_train", "deformation error on the training trajectory"),
+        number("relative_error_heldout", "median position error on test trajectories"),
+        number("relative_error_heldout_high", "largest position error on test trajectories"),
         *results.COLUMNS[3:],
         *shared("ms_per_frame vertices_ms"),
         timed(number("ms_per_iteration", "time of an iteration", "ms")),
@@ -350,7 +350,7 @@ def online(rows: pd.DataFrame, measured: pd.DataFrame, times: pd.DataFrame) -> p
     """One row per model of a large scene: errors in ``rows``, times in ``measured``, ``times``."""
     made = results.trained(rows).rename(columns={"r": "elements_sampled"})
     made = made.assign(reference=declaration.ITERATIONS)
-    made = made.drop(columns="playback_error")  # zero, as playback repeats the training motion
+    made = made.drop(columns="playback_error")  # zero, as the training run is replayed exactly
     found = timed_reductions(measured, times)[[*_MODEL, *_TIMES]]
     for source in (large_errors(rows).rename(columns=_ERRORS), found):
         made = with_whole_sizes(made).merge(with_whole_sizes(source), on=_MODEL, how="left")

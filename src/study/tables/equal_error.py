@@ -1,6 +1,6 @@
-"""Reduced models beside the fastest full-order settings that are at least as accurate.
+"""Tables of reduced models and of the fastest full-order settings that are as accurate.
 
-A setting is a method with its numbers; the full order also runs on coarser meshes.
+A setting is a method with its parameters; full-order settings include coarser meshes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -21,52 +21,52 @@ from study.tables.kit import declaration, results
 from study.tables.kit.declaration import estimate, flag, integer, number, shared, table, text, timed
 from study.tables.kit.results import Rows
 
-# The reduced model of `equal_error`; where a recording holds fewer modes, the nearest number.
+# The reduced model of `equal_error`; if the training has fewer modes, the nearest number.
 FIXED = ReducedModel(training_motions=(1, 2))
-# Column of speed-ups -> column of the error that the full order must have at most.
+# Column of speed-ups -> column of the error that full-order settings must not exceed.
 AHEAD = {
     "ahead": "validation_error", "ahead_test": "position_error",
     "ahead_deformation": "deformation_error",
 }  # fmt: skip
 (RATIO,) = shared("time_ratio")
 PARTS = REDUCED, COARSER, SAME = "reduced", "coarser mesh", "same mesh"
-OWN = integer("vertices", "vertices of the scene's own mesh")
+OWN = integer("vertices", "number of vertices of the scene's mesh")
 
 
-def opponent(prefix: str, where: str) -> list[declaration.Column]:
-    """Columns, named by ``prefix``, of the fastest full-order setting and the speed-up over it."""
+def fastest(prefix: str, where: str) -> list[declaration.Column]:
+    """Columns, with ``prefix``, of the fastest full-order setting and the speed-up over it."""
     made = [
         text("method", f"fastest full-order setting {where} with at most this position error"),
-        *([integer("vertices", "vertices of its mesh")] if prefix == COARSER[:7] else []),
-        integer("substeps", "its steps of a frame"),
-        integer("iterations", "its iterations of each"),
+        *([integer("vertices", "number of vertices of its mesh")] if prefix == COARSER[:7] else []),
+        integer("substeps", "its number of steps in a frame"),
+        integer("iterations", "its number of iterations in a step"),
         number("error", "its position error"),
-        number("speedup", "its time over that of the reduced model in a process, median"),
+        number("speedup", "its time over that of the reduced model, median of processes"),
         *declaration.interval("speedup_low speedup_high"),
-        flag("reached", "a setting is as accurate; otherwise the most accurate one is taken"),
+        flag("reached", "a setting is as accurate; otherwise the row has the most accurate one"),
     ]
     return [timed(replace(column, name=f"{prefix}_{column.name}")) for column in made]
 
 
 @table(
-    title="Speed-ups over full-order settings that are at least as accurate",
+    title="Speed-ups over the fastest full-order settings that are at least as accurate",
     columns=(
         *shared("scene factor"),
         OWN,
         *shared("stiffness"),
         runs.MOTION,
-        text("elements", "what the scene's constraints act on: springs, triangles or tetrahedra"),
+        text("elements", "elements of the constraints: springs, triangles or tetrahedra"),
         text("method", "reduced model: ecsw with few iterations, ecsw-newton to a tolerance"),
         runs.ITERATIONS,
         *shared("training_motions k"),
-        number("position_error", "of all frames, against the converged step; inf if it blew up"),
+        number("position_error", "against the converged step, all frames; inf: blew up"),
         *shared("deformation_error"),
         estimate("implicit_error", "position error of the converged step"),
-        flag("known", "which is at most a third of the position error", compared="error"),
+        flag("known", "implicit_error is at most a third of the position error", compared="error"),
         *shared("time_ratio vertices_ratio offline_ratio mesh_error"),
-        *opponent("same", "on the same mesh"),
-        *opponent("coarser", "on the same or a coarser mesh"),
-        timed(number("pays_after", "frames after which it has paid off its training beside that")),
+        *fastest("same", "on the same mesh"),
+        *fastest("coarser", "on the same or a coarser mesh"),
+        timed(number("pays_after", "frames that save the training time, against coarser_method")),
         results.DAY,
     ),
     reads={
@@ -81,8 +81,8 @@ def equal_error(
 ) -> pd.DataFrame:
     """One row per test trajectory and reduced model with the settings of `FIXED`.
 
-    Opponents are all timed full-order settings that have at most the model's position error over
-    all frames in this trajectory. Speed-ups are ratios within a process.
+    It is compared with all timed full-order settings that have at most the model's position error
+    over all frames of this trajectory. Speed-ups are ratios of times in the same process.
     """
     rows, ms, _ = _of_this_run(rows, times)
     found = []
@@ -129,7 +129,7 @@ def _fixed(rows: pd.DataFrame) -> Iterator[Any]:
 
 
 def _beside(full: pd.DataFrame, model: Any, ms: pd.DataFrame, prefix: str) -> dict[str, Any]:
-    """Values of the columns `opponent`, chosen from settings ``full``; ``ms`` are all times."""
+    """Values of the columns `fastest`, chosen from settings ``full``; ``ms`` are all times."""
     if full.empty:
         return {}
     able = full[full.error_implicit <= model.error]
@@ -145,24 +145,24 @@ def _beside(full: pd.DataFrame, model: Any, ms: pd.DataFrame, prefix: str) -> di
 
 
 @table(
-    title="The best settings of a scene, chosen on validation trajectories",
+    title="Best settings of each scene, chosen on validation trajectories",
     columns=(
         *shared("scene factor"),
         OWN,
-        text("part", f"settings that the row is the best of, one of: {', '.join(PARTS)}"),
+        text("part", f"settings that are compared, one of: {', '.join(PARTS)}"),
         *map(
             timed,
             (
-                text("method", "how a frame is solved, see alternatives"),
-                integer("simulated", "vertices of the mesh that is simulated"),
+                text("method", "solver of a frame, see alternatives"),
+                integer("simulated", "number of vertices of the simulated mesh"),
                 runs.ITERATIONS,
                 *shared("k skinning"),
-                number("tolerance", "sampling tolerance of its elements"),
+                number("tolerance", "tolerance of the element sampling"),
                 *shared("training_motions"),
-                number("validation_error", "largest position error of a validation trajectory"),
-                number("validation_deformation", "the largest deformation error of one"),
-                number("position_error", "largest position error of a test trajectory"),
-                number("deformation_error", "the largest deformation error of one"),
+                number("validation_error", "largest position error on validation trajectories"),
+                number("validation_deformation", "largest deformation error on them"),
+                number("position_error", "largest position error on test trajectories"),
+                number("deformation_error", "largest deformation error on test trajectories"),
                 replace(RATIO, meaning=f"{RATIO.meaning}, median"),
                 *shared("offline_ratio"),
                 number(
@@ -170,8 +170,8 @@ def _beside(full: pd.DataFrame, model: Any, ms: pd.DataFrame, prefix: str) -> di
                     "time of the fastest full-order setting on any mesh with at most this "
                     "validation error, over that of the reduced model; empty: there is none",
                 ),
-                number("ahead_test", "the same, with at most this position error on test ones"),
-                number("ahead_deformation", "with at most this deformation error on test ones"),
+                number("ahead_test", "as ahead, with at most this test position error"),
+                number("ahead_deformation", "as ahead, with at most this test deformation error"),
             ),
         ),
         results.DAY,
@@ -183,10 +183,10 @@ def _beside(full: pd.DataFrame, model: Any, ms: pd.DataFrame, prefix: str) -> di
     },
 )
 def frontier(rows: pd.DataFrame, times: pd.DataFrame, record: list[Path]) -> pd.DataFrame:
-    """One row per setting that no other of its part beats in validation error and time.
+    """One row per setting, if no setting of its part has a smaller validation error and time.
 
-    Scenes without validation trajectories, or with other weights than their own, have no rows. A
-    run that blew up has an infinite error.
+    Scenes without validation trajectories or with changed weights have no rows. A run that blew up
+    has an infinite error.
     """
     rows, ms, plain = _of_this_run(rows, times)
     parts = [
@@ -199,7 +199,7 @@ def frontier(rows: pd.DataFrame, times: pd.DataFrame, record: list[Path]) -> pd.
 
 
 def _frontier(rows: pd.DataFrame, ratios: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the table for those of one mesh, whose times over the plain one are ``ratios``."""
+    """Rows of table frontier for ``rows`` of a mesh; ``ratios``: times over the plain time."""
     vertices = rows.vertices.max()
     rows = rows[~rows.method.isin([CONVERGED, PLAYBACK])]
     setting = rows.groupby(SETTING, sort=False, dropna=False).ngroup()
@@ -218,8 +218,8 @@ def _frontier(rows: pd.DataFrame, ratios: pd.DataFrame) -> pd.DataFrame:
     made["part"] = np.select([reduced, coarser], [REDUCED, COARSER], SAME)
     full = made[~reduced]
     for name, error in AHEAD.items():
-        fastest = [full.time_ratio[full[error] <= limit].min() for limit in made[error]]
-        made[name] = (fastest / made.time_ratio).where(reduced)
+        least = [full.time_ratio[full[error] <= limit].min() for limit in made[error]]
+        made[name] = (least / made.time_ratio).where(reduced)
     best = [
         own[pareto(own.validation_error.to_list(), own.time_ratio.to_list())]
         for own in (made[made.part == part].sort_values("time_ratio") for part in PARTS)

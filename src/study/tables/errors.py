@@ -22,7 +22,7 @@ from study.tables.kit import declaration, results
 from study.tables.kit.declaration import count, flag, integer, number, shared, table, text
 from study.tables.kit.results import Rows
 
-_SMALL = "empty: only rounding errors"
+_SMALL = "empty: rounding errors"
 # Rounding errors change errors of approximations less than those of runs: by at most 7e-4.
 _approximation = partial(number, compared="value", tolerance=0.005)
 _CELL = ["scene", "group", "method", "r", "varied"]
@@ -35,7 +35,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
         integer("component", "number of the mode, from 1"),
         number("singular_value", "of the snapshot matrix", "unit of the group's projections"),
         number("relative", "singular value over the first one"),
-        flag("above_roundoff", "singular value exceeds the rounding errors of the projections"),
+        flag("above_roundoff", "singular value exceeds rounding errors of the projections"),
     ),
     # The basis of a group is its `USUAL_BASIS` (no weights, not centred) if the study has it.
     reads={"bases": EachOf(paths.BASIS, "usual_bases")},
@@ -56,9 +56,9 @@ def singular_values(bases: list[paths.File]) -> pd.DataFrame:
     title="Reconstruction error of every method and size",
     columns=(
         *shared("scene group method r"),
-        text("split", "snapshots that are reconstructed: train, test (frames between), heldout"),
+        text("split", "reconstructed snapshots: train, test (frames between), heldout"),
         _approximation("relative_error", f"relative error of the projections; {_SMALL}"),
-        *(_approximation(f"relative_error_{a}", f"error of {a}-coordinates; {_SMALL}") for a in "xyz"),
+        *(_approximation(f"relative_error_{a}", f"of {a}-coordinates; {_SMALL}") for a in "xyz"),
         *shared("gain"),
         integer("rows_sampled", "number of evaluated rows of projections", compared="value"),
         *shared("elements_sampled"),
@@ -76,7 +76,7 @@ def reconstruction_error(rows: pd.DataFrame) -> pd.DataFrame:
         *shared("scene"),
         text("perturbation", "initial displacement over the extent, or the change of the run"),
         integer("frame", "number of the frame, from 0"),
-        number("relative_difference", "difference to the original run, largest over seeds", compared="error"),
+        number("relative_difference", "to the unperturbed run, largest of seeds", compared="error"),
     ),
     reads={"rows": Rows(paths.SENSITIVITY)},
 )

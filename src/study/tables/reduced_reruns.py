@@ -1,4 +1,4 @@
-"""Tables of reduced runs: errors, times, and how runs end, also in scenes with extreme settings."""
+"""Tables of reduced runs: errors, times and outcomes, also in scenes with extreme settings."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -21,7 +21,7 @@ from study.tables.kit.results import Rows
 
 
 @table(
-    title="Reduced runs of the training and the held-out motions",
+    title="Reduced runs on training and test trajectories",
     columns=(
         *shared("scene group method position_basis k r frames finite blowup_frame max_extent"),
         *shared("training_residual relative_error relative_error_within_horizon"),
@@ -31,7 +31,7 @@ from study.tables.kit.results import Rows
         *shared("error_over_extent shape_error velocity_error energy_drift"),
         text(
             "motion",
-            f"{TRAIN}, or how the motion differs from the training one: {', '.join(MOTIONS)}",
+            f"trajectory: {TRAIN}, or a test trajectory, one of: {', '.join(MOTIONS)}",
         ),
     ),
     reads={
@@ -52,12 +52,12 @@ def reduced_reruns(
     references: pd.DataFrame, timings: pd.DataFrame, frame_times: pd.DataFrame,
     sensitivity: pd.DataFrame, horizon: Horizon, **files: list[File],
 ) -> pd.DataFrame:  # fmt: skip
-    """Reduced runs of the training motion with their times, then runs of each held-out motion.
+    """Reduced runs on the training trajectory with their times, then on each test trajectory.
 
-    Rows of runs in position subspaces follow those of reduced groups. The horizon of a scene and
-    motion is the first frame in which perturbed full-order runs differ from unperturbed ones by
-    more than a limit. Errors "within the horizon" use earlier frames only, and are empty if a run
-    blew up in these. Rows of method `PLAYBACK` compare the training with a held-out motion.
+    Runs with reduced positions follow runs with reduced groups. The horizon of a trajectory is the
+    first frame in which perturbed full-order runs differ from the unperturbed run by more than a
+    limit. Errors "within the horizon" use earlier frames only and are empty if a run blew up in
+    these. Rows of method `PLAYBACK` compare the training trajectory with a test trajectory.
     """
     judged: list[pd.DataFrame] = []
     for motion in (TRAIN, *MOTIONS):
@@ -86,7 +86,7 @@ def reduced_reruns(
 
 
 def _played(references: pd.DataFrame, motion: str) -> pd.DataFrame:
-    """Errors, a row per scene, if the training motion is played back in place of ``motion``."""
+    """Errors, a row per scene, if the training trajectory is replayed instead of ``motion``."""
     rows = references[references.motion == motion]
     return pd.DataFrame({
         "scene": rows.scene, "group": "all", "method": PLAYBACK, "position_basis": "full",
@@ -119,7 +119,7 @@ def _judged(run: File, row: File, end: int, motion: str) -> pd.DataFrame:
 def _errors(
     runs: Sequence[h5py.Group], reference: Series, end: int, units: Mapping[str, Any]
 ) -> dict[str, list[float | None]]:
-    """Name of an error -> its values over frames before ``end``, one per run; None if it ended."""
+    """Name of an error -> its values before frame ``end``, one per run; None if it blew up."""
     known = {unit: float(units[unit]) for unit in ("extent_norm", "rest_norm")}
     found = [
         errors_within({series: run[series][...] for series in DEVIATIONS}, reference, end, **known)
@@ -137,7 +137,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
     reduced["local_ms"] += reduced.assembly_ms + reduced.lift_ms
     own = reduced.scene.map(full.set_index("scene").ms_per_frame)
     reduced["speedup"] = own / reduced.ms_per_frame
-    # match rows of subspace models by the size k, as their r is the number of sampled elements
+    # Rows of subspace models are matched by k, because their r is the number of sampled elements.
     for rows in (runs, reduced):
         rows["size"] = rows.r.where(rows.position_basis == "full", rows.k).astype(float)
     keys = ["scene", "group", "method", "position_basis", "size"]
@@ -147,7 +147,7 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame) -> pd.DataFrame:
 
 OUTCOMES = ("accurate", "wrong", "left the scene", "blow-up", "not run", "not judged")
 SETTING = ["experiment", "scene", "h", "stiffness_ratio"]  # columns that identify a full-order run
-# Fraction of runs on degenerate meshes that may end otherwise than expected, due to round-off.
+# Fraction of runs on degenerate meshes whose outcome may differ because of rounding errors.
 FRAGILE = 0.005
 
 
@@ -158,7 +158,7 @@ FRAGILE = 0.005
         number("h", "time step", "s", compared="exact"),
         number("stiffness_ratio", "factor on the weights of the reduced groups", compared="exact"),
         *shared("finite blowup_frame max_extent energy_ratio gain group position_basis k"),
-        text("experiment", "rerun (of the study) or sweep (a short run)"),
+        text("experiment", "rerun (run of the study) or sweep (short run)"),
         *shared("reference relative_error"),
         text("outcome", f"one of: {', '.join(OUTCOMES)}", compared="error"),
     ),
@@ -225,17 +225,17 @@ def _full_order_rows(files: list[File]) -> pd.DataFrame:
 
 
 @table(
-    title="Every reduction in every hard case",
+    title="Outcome of every reduction in every hard case",
     columns=(
         text("case", "name of the hard case"),
         *shared("method"),
-        flag("bounded_projections", "no state makes projections of the reduced group large"),
+        flag("bounded_projections", "projections of the reduced group are bounded in every state"),
         *shared("k r gain frames"),
-        flag("finite", "no frame blew up", compared="error", tolerance=FRAGILE),
+        flag("finite", "no frame of the run blew up", compared="error", tolerance=FRAGILE),
         *shared("blowup_frame"),
-        number("max_extent", "largest extent over the full order's scale", compared="error"),
-        text("outcome", "how the reduction fared", compared="error", tolerance=FRAGILE),
-        text("why", "of a refusal or a failure", compared="error", tolerance=FRAGILE),
+        number("max_extent", "largest extent over that of the full-order run", compared="error"),
+        text("outcome", "outcome of the reduced run", compared="error", tolerance=FRAGILE),
+        text("why", "reason of a refusal or a failure", compared="error", tolerance=FRAGILE),
     ),
     reads={"rows": Rows(paths.HARD_CASES)},
 )

@@ -25,7 +25,7 @@ MOTION = text("motion", f"test trajectory, one of: {', '.join(MOTIONS)}")
             "distance of the converged run from the best rigid motions of the rest shape, over "
             "the norm of the displacement, all frames",
         ),
-        number("affine", "as deformation, for the best affine maps of the rest shape", compared="error"),
+        number("affine", "as deformation, but from the best affine maps", compared="error"),
         *shared("reference"),
         number("replay_error", "position error if the training trajectory is replayed instead"),
         number("replay_deformation_error", "deformation error if it is replayed"),

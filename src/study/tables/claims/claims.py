@@ -34,7 +34,7 @@ def values_of(test: TestRule, tables: Tables) -> pd.DataFrame:
 
 
 def compared(test: TestRule, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Whether each of ``values`` satisfies ``test``; whether it is a time too close to decide."""
+    """Whether each value satisfies ``test``; whether it is a time too close to the threshold."""
     passed = values >= test.threshold if test.compare == ">=" else values <= test.threshold
     ratio = METRICS[test.metric].ratio
     apart = ratio(values) / ratio(np.array(test.threshold))
@@ -44,8 +44,8 @@ def compared(test: TestRule, values: np.ndarray) -> tuple[np.ndarray, np.ndarray
 def answer(share: float, good: int, total: int) -> str:
     """Verdict of a test of which ``good`` rows of ``total`` rows satisfy the comparison.
 
-    It "holds" if at least a fraction ``share`` of rows satisfies the comparison, "does not hold" if
-    at least this fraction violates it, "cannot be decided" without rows, and else "depends".
+    The verdict is "holds" if at least a fraction ``share`` of rows satisfies the comparison, "does
+    not hold" if this fraction violates it, "cannot be decided" without rows, and else "depends".
     """
     if total == 0:
         return UNDECIDED
@@ -81,7 +81,7 @@ def outcome(test: TestRule, tables: Tables) -> dict[str, Any]:
         why = "nothing to compare in this configuration"
         where = {k: v for k, v in test.where.items() if k != "r"}
         if test.metric == "rerun_error" and len(filtered(tables[RERUNS], where)):
-            why = "no size can run, the numerical rank allows none"
+            why = "the snapshots have too small a numerical rank for every basis size"
         return made | {"measured": "no data", "sentence": f"{test.what}: {why}"}
     spread = _range(values)
     limit = f"{'at least' if test.compare == '>=' else 'at most'} {test.threshold:g}"
@@ -123,7 +123,7 @@ def _text(value: float) -> str:
 
 
 def combined(verdicts: Sequence[str]) -> str:
-    """Verdict of a claim: the first in this list that a test has, "not tested" without tests.
+    """Verdict of a claim: the first of this list that a test has, or "not tested" without tests.
 
     "cannot be decided", "does not hold", "depends on the machine", "depends", "holds"
     """
@@ -162,8 +162,8 @@ def timed_parts(*cells: str) -> TimedCells:
 
 
 ONE_OF = f"one of: {', '.join(VERDICTS)}"
-CLAIM = text("claim", "its identifier in config/claims.yaml")
-# Construct columns that may depend on times: verdicts, and what is not compared with expected ones.
+CLAIM = text("claim", "name of the claim in config/claims.yaml")
+# Make columns that may depend on times: verdicts, and texts that are not compared between runs.
 judged = partial(text, timed=True, compared="exact")
 skipped = partial(Column, timed=True, compared="skipped")
 FACTORS = (0.5, 0.8, 1.25, 2.0)  # table claims_sensitivity multiplies thresholds by these
@@ -172,7 +172,7 @@ MARGINS = (1.0, 1.25, 1.5, 2.0, 3.0, 5.0)  # tried values of `TestRule.margin`; 
 SMALL = 10  # claims_sensitivity repeats tests with sizes r <= this only, and with larger r only
 SPLITS = ("train", "test", "heldout")
 VARIED = ("threshold", "share", "margin", "sizes", "splits", "scenes", "measure")
-# Share of claims_sensitivity's verdicts (some rest on few runs) that may differ from expected ones.
+# Share of verdicts in claims_sensitivity (some rest on few runs) that may differ between machines.
 FRAGILE = 0.01
 _Rows = list[pd.DataFrame]
 _Keep = Callable[[pd.Series], pd.Series]
@@ -183,25 +183,25 @@ _Variation = tuple[str, str, Sequence[TestRule], _Rows]  # (one of `VARIED`, cha
     title="Verdicts on the claims of the preprint",
     columns=(
         CLAIM,
-        text("source", "who claims it"),
-        text("paper", "what the preprint says"),
-        skipped("text", "measured", "range of what was measured, of the tests that decide"),
-        judged("verdict", f"as published, {ONE_OF}"),
-        skipped("text", "why", "all tests in words"),
-        text("figure_or_table", "where to see it"),
+        text("source", "authors of the claim"),
+        text("paper", "statement of the preprint"),
+        skipped("text", "measured", "range of the values in the tests that decide"),
+        judged("verdict", f"verdict as published, {ONE_OF}"),
+        skipped("text", "why", "all tests as published, in words"),
+        text("figure_or_table", "figure or table with the result"),
         text("section", "section of the preprint"),
         text("shown", "figures of the preprint"),
         text("text", "the claim in our words"),
-        text("qualifiers", "what a fair test has to keep"),
-        skipped("text", "condition", "what the verdict depends on"),
-        skipped("text", "measured_beyond", "the same of sound variants on well-posed scenes"),
-        judged("verdict_beyond", "the verdict there"),
-        judged("verdict_both", "as published, if the deformation error counts, too"),
-        judged("verdict_beyond_both", "the same of sound variants"),
-        skipped("text", "condition_beyond", "what it depends on"),
-        skipped("text", "why_beyond", "all tests there in words"),
-        skipped("text", "answer", "both verdicts in words"),
-        text("history", "when and why the rules became what they are"),
+        text("qualifiers", "conditions that a fair test must respect"),
+        skipped("text", "condition", "rows that satisfy a test that depends, broken down"),
+        skipped("text", "measured_beyond", "measured, for the improved method and its scenes"),
+        judged("verdict_beyond", "verdict for the improved method, well-posed scenes"),
+        judged("verdict_both", "verdict as published, if the deformation error counts, too"),
+        judged("verdict_beyond_both", "verdict_beyond, if the deformation error counts, too"),
+        skipped("text", "condition_beyond", "condition, for verdict_beyond"),
+        skipped("text", "why_beyond", "all tests for verdict_beyond, in words"),
+        skipped("text", "answer", "verdict and verdict_beyond, in words"),
+        text("history", "dates and reasons of changes to the rules"),
     ),
     reads=READS,
     timed_cells=by_rules(lambda rule, row: timed_columns(rule)),
@@ -246,21 +246,21 @@ def _timed_of_test(rule: ClaimRule, row: Any) -> set[str]:
     title="Tests of the claims",
     columns=(
         CLAIM,
-        text("part", f"which verdict: {', '.join(PARTS)}"),
-        text("what", "words for the rows that are compared"),
-        text("metric", "what is compared"),
-        flag("decides", "the verdict rests on it; the others are for information"),
+        text("part", f"verdict that the test is for: {', '.join(PARTS)}"),
+        text("what", "compared quantity, method and scenes"),
+        text("metric", "name of the compared metric"),
+        flag("decides", "the test decides the verdict; other tests are for information"),
         text("compare", "comparison with the threshold"),
-        number("threshold", "what a value is compared with"),
-        number("share", "of the rows that must agree for a clear answer"),
+        number("threshold", "limit with which values are compared"),
+        number("share", "share of the rows that must agree for a clear answer"),
         number("margin", "factor of the threshold within which a ratio of times decides nothing"),
-        skipped("integer", "satisfied", "rows that satisfy the comparison"),
-        skipped("integer", "of", "rows that are compared"),
-        skipped("integer", "close", "of them, ratios of times within the margin"),
-        skipped("number", "least", "smallest value; infinite for a run that failed"),
-        skipped("number", "median", "their median"),
+        skipped("integer", "satisfied", "number of rows that satisfy the comparison"),
+        skipped("integer", "of", "number of compared rows"),
+        skipped("integer", "close", "number of ratios of times within the margin"),
+        skipped("number", "least", "smallest value; inf: a run blew up"),
+        skipped("number", "median", "median of the values"),
         skipped("number", "most", "largest value"),
-        judged("verdict", f"of this test, {ONE_OF}"),
+        judged("verdict", f"verdict of this test, {ONE_OF}"),
     ),
     reads=READS,
     timed_cells=by_rules(_timed_of_test),
@@ -281,20 +281,20 @@ def claims_tests(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFr
     title="Verdicts under other rules",
     columns=(
         CLAIM,
-        text("part", f"tests that decide: {', '.join(PARTS)}"),
-        text("varied", f"what is changed in all of them: {', '.join(VARIED)}"),
-        text("variation", "how: factor, share, sizes, split, scene left out"),
-        judged("verdict", ONE_OF, tolerance=FRAGILE),
-        judged("verdict_of_rules", "the verdict of the rules as they are"),
-        timed(flag("same", "the two agree", compared="exact", tolerance=FRAGILE)),
+        text("part", f"verdict that is repeated: {', '.join(PARTS)}"),
+        text("varied", f"property changed in all tests that decide: {', '.join(VARIED)}"),
+        text("variation", "change: factor, share, sizes, split or scene left out"),
+        judged("verdict", f"verdict after the change, {ONE_OF}", tolerance=FRAGILE),
+        judged("verdict_of_rules", "verdict of the unchanged rules"),
+        timed(flag("same", "the two verdicts agree", compared="exact", tolerance=FRAGILE)),
     ),
     reads=READS,
     timed_cells=timed_parts("verdict", "verdict_of_rules", "same"),
 )
 def claims_sensitivity(rules: Path, added: Added, **tables: pd.DataFrame) -> pd.DataFrame:
-    """One row per claim, kind of verdict (`PARTS`) and variation of the tests that decide it.
+    """One row per claim, kind of verdict (`PARTS`) and variation of its deciding tests.
 
-    A variation is omitted if a test has no rows; of sizes, splits, scenes, also if no row changes.
+    A variation is omitted if a test has no rows or, for sizes, splits and scenes, loses none.
     """
     made = []
     for (claim, rule), part in product(load_claims(rules, added).items(), PARTS):
@@ -361,20 +361,20 @@ def _kept(
 
 
 @table(
-    title="Verdicts on other scenes, by the same rules",
+    title="Verdicts on other scenes by the same rules",
     columns=(
-        text("replication", "its name in config/reference/replication/commits.csv"),
+        text("replication", "name of the replication in config/reference/replication/commits.csv"),
         CLAIM,
-        text("part", f"which verdict: {', '.join(PARTS)}"),
-        judged("verdict", f"of this study, {ONE_OF}"),
-        text("verdict_replication", "the recorded verdict on the other scenes"),
-        timed(flag("decidable", "neither is one of the last two", compared="exact")),
-        timed(flag("same", "the two agree", compared="exact")),
-        skipped("text", "measured", "range of the tests that decide"),
-        text("measured_replication", "the same range there"),
-        flag("rules_unchanged", "the rules are those by which the record was decided"),
+        text("part", f"kind of the verdict: {', '.join(PARTS)}"),
+        judged("verdict", f"verdict of this study, {ONE_OF}"),
+        text("verdict_replication", "recorded verdict on the other scenes"),
+        timed(flag("decidable", "neither verdict is undecided or not tested", compared="exact")),
+        timed(flag("same", "the two verdicts agree", compared="exact")),
+        skipped("text", "measured", "range of the values in the tests that decide"),
+        text("measured_replication", "range of these values on the other scenes"),
+        flag("rules_unchanged", "the record was decided by the present rules"),
         text("date", "day of the record"),
-        text("frozen", "commit with the rules, the scenes and the code, before the first run"),
+        text("frozen", "commit with rules, scenes and code, before the first run"),
         text("recorded", "commit with the record"),
     ),
     reads={
@@ -386,7 +386,7 @@ def _kept(
     timed_cells=timed_parts("verdict", "decidable", "same", "measured"),
 )
 def replication(claims: pd.DataFrame, rules: Path, recorded: Path, commits: Path) -> pd.DataFrame:
-    """Verdicts of ``claims`` beside ``recorded`` ones; a row per replication, claim and part."""
+    """Verdicts of ``claims`` and ``recorded`` ones; one row per replication, claim and part."""
     others = pd.read_csv(recorded).merge(pd.read_csv(commits, dtype=str), on="replication")
     both = others.merge(claims, on="claim", suffixes=("_replication", ""))
     fingerprints = {claim: rule.fingerprint for claim, rule in load_claims(rules).items()}

@@ -31,11 +31,11 @@ def filtered(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 
 
 def reruns(table: pd.DataFrame, where: Where) -> pd.DataFrame:
-    """Reduced runs of the training motion that ``where`` selects and that could be started.
+    """Reduced runs on the training trajectory that ``where`` selects and that could be started.
 
     Runs with reduced positions are included only if ``where`` selects a position basis, because
     methods have the same names there. ``r: [full]`` selects the largest size tried for each scene,
-    group and method, even if that run blew up: no smaller size must be mistaken for full rank.
+    group and method, even if that run blew up, as no smaller size is the full rank.
     """
     table = trained(table)
     table = table if "position_basis" in where else table[table.position_basis == "full"]
@@ -55,13 +55,13 @@ def by_axis(table: pd.DataFrame, where: Where) -> pd.DataFrame:
 def held_out(
     choose: Callable[[pd.DataFrame, Where], pd.DataFrame], table: pd.DataFrame, where: Where
 ) -> pd.DataFrame:
-    """Rows of ``table`` that ``choose`` selects, with the median of their held-out errors."""
+    """Rows of ``table`` that ``choose`` selects, with the median of their test errors."""
     runs = with_held_out(trained(table), table)
     return choose(runs[runs[MEDIAN].notna()].assign(**{ERROR: runs[MEDIAN]}), where)
 
 
 def decay(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Singular values / largest of the constraint group; groups of mere round-off are left out."""
+    """Singular value / largest one of the group; groups of mere rounding errors are left out."""
     return rows.relative[rows.groupby(EXPERIMENT).above_roundoff.transform("any")]
 
 
@@ -71,7 +71,7 @@ def reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
 
 
 def axis_reconstruction(rows: pd.DataFrame, accuracy: float) -> pd.Series:
-    """Reconstruction errors of each coordinate, but for axes whose projections are round-off."""
+    """Reconstruction errors of each coordinate, without axes that have only rounding errors."""
     rows = rows[rows.gain.notna()]
     curve = [rows[label] for label in (*_RUN, "split", "axis")]
     real = rows.relative_error.notna().groupby(curve).transform("any")
@@ -121,10 +121,10 @@ def trend_p_value(name: str, rows: pd.DataFrame, accuracy: float) -> pd.DataFram
     """P-value of Page's test (1963) that the error in column ``name`` rises with the size r.
 
     Treatments are the sizes of an experiment (scene, group, method); runs that blew up share the
-    highest rank. A scene and its variant ("twin") are one block, with mean ranks. Only experiments
+    highest rank. A scene and its short variant are one block, with mean ranks. Only experiments
     with the most common number of sizes are used. No row for less than 2 blocks or 3 sizes.
     """
-    # imported here, as the import takes a second and planning the workflow does not need SciPy
+    # Imported here because the import takes a second and planning the workflow does not need SciPy.
     from scipy.stats import page_trend_test, rankdata
 
     ranks: dict[int, dict[str, list[pd.Series]]] = defaultdict(lambda: defaultdict(list))
@@ -165,7 +165,7 @@ class Metric:
         values of some of these rows, or a table with columns `VALUE`, scene, group ...
     choose : function of the table and ``where`` (column -> allowed values) that selects the rows
     labels : columns that ``where`` may name although the table lacks them: ``choose`` adds them
-    timed : whether values are computed from measured times; ``ratio`` makes a ratio of two of one
+    timed : whether values are measured times; ``ratio``: function that makes ratios of two times
     """
 
     of: Values

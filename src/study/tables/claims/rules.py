@@ -32,7 +32,7 @@ READS: dict[str, Read] = {
 class TestRule(ConfigModel):
     """Test of a claim: comparison of a metric with a threshold.
 
-    what : description of the compared rows, quoted in the reason of the verdict
+    what : description of the compared quantity and rows, which must be understood without context
     metric, where : name in `METRICS`; column -> allowed values
     accuracy : a run counts as accurate up to this error, in metrics that need accurate runs
     margin : a ratio of times that differs from the threshold by less than this factor counts
@@ -102,7 +102,7 @@ class ClaimRule(ConfigModel):
     section, shown : section and figures of the preprint
     qualifiers : conditions that a fair test has to respect
     published : tests on the preprint's variants of the method and on its scenes
-    beyond : tests on sound methods (as in set ``sound`` of config/claims.yaml) and well-posed
+    beyond : tests on the improved method (set ``sound`` of config/claims.yaml) and well-posed
         scenes; if none of them decides, the verdict beyond the preprint is "not tested"
     changes : history of the rules, oldest first
     """
@@ -121,10 +121,10 @@ class ClaimRule(ConfigModel):
     @model_validator(mode="after")
     def _sound(self) -> Self:
         if not any(test.decides for test in self.published):
-            raise ValueError("published: none of them decides")
+            raise ValueError("published: no test decides; set decides: true for at least one test")
         dates = [change.date for change in self.changes]
         if dates != sorted(dates):
-            raise ValueError("changes: dates must not go back")
+            raise ValueError("changes: dates must ascend; move the entry to its place")
         return self
 
     @property

@@ -164,7 +164,7 @@ _SHARED = (
     ),
     number("error_converged", "position error before the horizon, against the converged run"),
     number("deformation_converged", "deformation error against the converged run"),
-    text("reference", f"full-order run that errors refer to: the scene's {ITERATIONS} or {CONVERGED}"),
+    text("reference", f"full-order run errors refer to: the scene's {ITERATIONS} or {CONVERGED}"),
     estimate("reference_error", "estimated position error of the converged run"),
     estimate("reference_deformation_error", "estimated deformation error of that run"),
     estimate(
@@ -180,9 +180,7 @@ _SHARED = (
         "error_over_extent",
         "root-mean-square distance of vertices from the reference before the horizon, over extent",
     ),
-    number(
-        "shape_error", "as error_over_extent, without the best rigid motion of each frame"
-    ),
+    number("shape_error", "as error_over_extent, without the best rigid motion of each frame"),
     number(
         "velocity_error",
         "error of the velocities before the horizon, over the norm of the full-order velocities",
@@ -195,7 +193,7 @@ _SHARED = (
     ),
     integer("horizon_frame", "predictability horizon of the scene: first frame that is not judged"),
     number(
-        "sensitivity_floor", "largest difference of perturbed runs before the horizon", compared="error"
+        "sensitivity_floor", "largest change by perturbations before the horizon", compared="error"
     ),
     timed(number("ms_per_frame", "time of a frame", "ms")),
     timed(number("vertices_ms", "part of the frame time that computes all vertex positions", "ms")),
