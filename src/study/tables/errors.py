@@ -33,7 +33,7 @@ _CELL = ["scene", "group", "method", "r", "varied"]
     columns=(
         *shared("scene group"),
         integer("component", "number of the mode, from 1"),
-        number("singular_value", "of the snapshot matrix", "unit of the group's projections"),
+        number("singular_value", "singular value of snapshots", "unit of the group's projections"),
         number("relative", "singular value over the first one"),
         flag("above_roundoff", "singular value exceeds rounding errors of the projections"),
     ),
@@ -58,7 +58,7 @@ def singular_values(bases: list[paths.File]) -> pd.DataFrame:
         *shared("scene group method r"),
         text("split", "reconstructed snapshots: train, test (frames between), heldout"),
         _approximation("relative_error", f"relative error of the projections; {_SMALL}"),
-        *(_approximation(f"relative_error_{a}", f"of {a}-coordinates; {_SMALL}") for a in "xyz"),
+        *(_approximation(f"relative_error_{a}", f"error along {a}; {_SMALL}") for a in "xyz"),
         *shared("gain"),
         integer("rows_sampled", "number of evaluated rows of projections", compared="value"),
         *shared("elements_sampled"),
@@ -76,7 +76,7 @@ def reconstruction_error(rows: pd.DataFrame) -> pd.DataFrame:
         *shared("scene"),
         text("perturbation", "initial displacement over the extent, or the change of the run"),
         integer("frame", "number of the frame, from 0"),
-        number("relative_difference", "to the unperturbed run, largest of seeds", compared="error"),
+        number("relative_difference", "largest relative difference over seeds", compared="error"),
     ),
     reads={"rows": Rows(paths.SENSITIVITY)},
 )
@@ -114,8 +114,8 @@ def noise(rows: pd.DataFrame) -> pd.DataFrame:
     title="Runs repeated with other training frames or perturbed initial positions",
     columns=(
         *shared("scene group method r"),
-        text("varied", "training (frames), start; or n training trajectories, run on tests"),
-        integer("repetitions", "number n; the true median is in their range with p = 1 - 2^(1-n)"),
+        text("varied", "training (frames), start (positions), number of training trajectories"),
+        integer("repetitions", "n runs; the true median is in their range with p = 1 - 2^(1-n)"),
         integer("ended", "number of runs that blew up, with an infinite error", compared="error"),
         *shared("reference"),
         number("error_median", "median position error before the horizon"),

@@ -159,7 +159,8 @@ FRAGILE = 0.005
         number("stiffness_ratio", "factor on the weights of the reduced groups", compared="exact"),
         *shared("finite blowup_frame max_extent energy_ratio gain group position_basis k"),
         text("experiment", "rerun (run of the study) or sweep (short run)"),
-        *shared("reference relative_error"),
+        *shared("reference"),
+        number("relative_error", "position error: rerun before the horizon, sweep in all frames"),
         text("outcome", f"one of: {', '.join(OUTCOMES)}", compared="error"),
     ),
     reads={

@@ -156,7 +156,7 @@ _SHARED = (
     number("gain", "DEIM constant: norm of the inverse of the sampled modes; inf: singular"),
     number("energy_ratio", "largest energy over that of the full-order run", compared="error"),
     number("relative_error", "relative error of the positions, all frames"),
-    number("relative_error_within_horizon", "position error before the horizon"),
+    number("relative_error_within_horizon", "relative position error before the horizon"),
     number(
         "deformation_error",
         "error of the shapes in the frames of the position error, relative to the deformation; "
@@ -164,7 +164,7 @@ _SHARED = (
     ),
     number("error_converged", "position error before the horizon, against the converged run"),
     number("deformation_converged", "deformation error against the converged run"),
-    text("reference", f"full-order run errors refer to: the scene's {ITERATIONS} or {CONVERGED}"),
+    text("reference", f"full-order reference of errors: scene's {ITERATIONS} or {CONVERGED}"),
     estimate("reference_error", "estimated position error of the converged run"),
     estimate("reference_deformation_error", "estimated deformation error of that run"),
     estimate(
@@ -187,8 +187,8 @@ _SHARED = (
     ),
     number(
         "energy_drift",
-        "largest difference of total energy to the full-order run, over the largest energy of this "
-        "run; at the start, each fourth frame before the horizon, the last frame without one",
+        "largest difference of total energy to the full-order run, over the largest full-order "
+        "energy; start, every fourth frame before the horizon, without a horizon the last frame",
         compared="error",
     ),
     integer("horizon_frame", "predictability horizon of the scene: first frame that is not judged"),
@@ -208,7 +208,7 @@ _SHARED = (
     integer("skinning", "number of skinning columns added to the modes"),
     number(
         "time_ratio",
-        "frame time over that of ten projective-dynamics iterations, scene's mesh",
+        "frame time over that of ten plain iterations of projective dynamics, scene's mesh",
         timed=True,
     ),
     timed(number("vertices_ratio", "part of time_ratio that computes all vertex positions")),

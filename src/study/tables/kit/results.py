@@ -29,9 +29,7 @@ COLUMNS = (
     number(LOW, "least position error on test trajectories"),
     number(HIGH, "largest position error on test trajectories"),
     number(SHAPE, "median deformation error on test trajectories; inf: a run blew up"),
-    integer(
-        COUNT, "simulated test trajectories with frames before the horizon, far from the training"
-    ),
+    integer(COUNT, "test trajectories, 30 % or more from training, with frames before the horizon"),
     number("playback_error", "median error if the training trajectory is replayed instead"),
 )
 FAR = 0.3  # test trajectories whose relative distance to the training is less are left out
