@@ -197,7 +197,7 @@ share = partial(number, compared="share")
 @table(
     title="Changes of the error if the DEIM constant is lowered and the basis is the same",
     columns=(
-        text("step", f"change, one of: `{', '.join([*STEPS, *SQUARE, *KINDS])}`"),
+        text("step", f"change, one of: `{'; '.join([*STEPS, *SQUARE, *KINDS])}`"),
         text("mesh", f"meshes of the pairs: {', '.join(MESHES)}"),
         text("method_before", "method before the step"),
         text("method_after", "method after the step, with the same basis"),

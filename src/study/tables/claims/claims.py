@@ -78,19 +78,19 @@ def outcome(test: TestRule, tables: Tables) -> dict[str, Any]:
     made: dict[str, Any] = dict.fromkeys(("least", "median", "most"))
     made |= {"satisfied": good, "of": total, "close": near, "verdict": verdict, "condition": ""}
     if total == 0:
-        why = "nothing to compare in this configuration"
+        why = "this configuration has no rows for it"
         where = {k: v for k, v in test.where.items() if k != "r"}
         if test.metric == "rerun_error" and len(filtered(tables[RERUNS], where)):
             why = "the snapshots have too small a numerical rank for every basis size"
         return made | {"measured": "no data", "sentence": f"{test.what}: {why}"}
     spread = _range(values)
     limit = f"{'at least' if test.compare == '>=' else 'at most'} {test.threshold:g}"
-    beside = f"{near} of {total} within a factor {test.factor:g} of it"
+    beside = f"{near} of {total} within a factor {test.factor:g} of the limit"
     sentence = f"{test.what}: {good} of {total} {limit} (measured {spread})"
     if verdict in (DEPENDS, MACHINE):
         made["condition"] = f"{test.what}, {limit}: {_broken_down(test, rows, passed)}"
     if verdict == MACHINE:
-        made["condition"] += f" (measured {spread}; {beside}, which decides nothing)"
+        made["condition"] += f" (measured {spread}; {beside} decide nothing)"
     ends = {"least": values.min(), "median": np.median(values), "most": values.max()}
     sentence += f", {beside}" if near else ""
     return made | ends | {"measured": spread, "sentence": sentence}
