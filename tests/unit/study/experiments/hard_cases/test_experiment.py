@@ -30,7 +30,7 @@ def test_a_failure_is_listed_with_its_reason(tmp_path):
     table = table.set_index(["case", "method"])
     joint = table.loc["one_triangle", "deim-joint"]
     assert (joint.outcome, joint.finite, joint.blowup_frame) == ("singular", False, 0)
-    assert "One row serves x, y and z" in joint.why
+    assert "x, y and z share one row" in joint.why
     assert table.loc["one_triangle", "pod"].outcome == "holds"
     assert pd.isna(table.loc["one_triangle", "pod"].why)
     assert (table.loc["flat_bending"].outcome.iloc[:2] == "nothing to reduce").all()
