@@ -126,7 +126,7 @@ SCENE_CASES = [
           "effects: []\n", "no constraint group"),
     scene("no constraint", "  - {effect: spring, weight: 1.0e+5}\n", "", "no constraint group"),
     scene("effect as a word", "- {effect: gravity}", "- gravity", "effects[0] = 'gravity'",
-          "a mapping with a key 'effect'"),
+          "no mapping with a key 'effect'"),
     scene("unknown effect", "effect: spring", "effect: sprnig", "effects[2]", "unknown effect",
           "allowed: area, bending", "did you mean 'spring'?"),
     scene("unknown key of an effect", "select: left", "selct: left", "effects[1] (pins)", "selct"),

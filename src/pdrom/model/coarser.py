@@ -1,4 +1,4 @@
-"""A scene on a coarser mesh, interpolation between both meshes, and the error of a mesh."""
+"""A scene on a coarser mesh, interpolation between the meshes, and the error due to a mesh."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ from pdrom.model.mesh.types import Mesh
 from pdrom.model.runs import converged_run
 from pdrom.model.scene import Scene
 
-ORDERS = (0.5, 3.0)  # observed orders of convergence for which `mesh_error` tells an error
+ORDERS = (0.5, 3.0)  # observed orders of convergence for which `mesh_error` returns an error
 CELLS = "triangles", "tetrahedra"
-APART = 0.25  # part of the longest side by which the boxes of two meshes of a body may differ
-FIRST = 16  # number of elements, nearest by their centres, that are tried first for a point
-PAIRS = 1 << 18  # points times elements that are compared at a time
-INSIDE = 1e-9  # part of the mesh: a point that is nearer to an element lies in it
+APART = 0.25  # fraction of the longest side by which bounding boxes of both meshes may differ
+FIRST = 16  # number of elements with the nearest centres that are tried first for a point
+PAIRS = 1 << 18  # largest number of points times elements that are compared at a time
+INSIDE = 1e-9  # fraction of the longest side up to which a point near an element lies in it
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Coarser:
 
     scene : the scene on the coarser mesh
     fine : the finer mesh
-    matrix : (N, n) from values at the n coarse vertices to those at the N fine ones
+    matrix : (N, n) interpolation of values at the n coarse vertices to the N fine vertices
     """
 
     scene: Scene
@@ -42,7 +42,7 @@ class Coarser:
     matrix: sparse.csr_array
 
     def positions(self, y: np.ndarray) -> np.ndarray:
-        """Positions (N, 3) m of the fine vertices for ``y`` (n, 3) m of the coarse ones."""
+        """Return positions (N, 3) m of fine vertices, given ``y`` (n, 3) m of coarse vertices."""
         return self.fine.points + self.matrix @ (y - self.scene.mesh.points)
 
     @cached_property
@@ -50,7 +50,7 @@ class Coarser:
         return interpolation(self.fine, self.scene.mesh.points)
 
     def converged(self, tolerance: float, limit: int) -> np.ndarray | None:
-        """Positions (F + 1, N, 3) m of the fine vertices in `converged_run` of the coarse scene."""
+        """Return `converged_run` of the coarse scene at the fine vertices, (F + 1, N, 3) m."""
         run = converged_run(self.scene, tolerance, limit)
         return None if run is None else np.stack([self.positions(y) for y in run])
 
@@ -63,26 +63,26 @@ class Coarser:
 def on_mesh(scene: Scene, mesh: Mesh) -> Coarser:
     """Return ``scene`` on the coarser ``mesh``, with the same effects.
 
-    A coarse vertex gets the masses of the fine ones in the shares in which these take its
-    displacement, so that the mass and its centre stay.
+    The mass of each fine vertex is divided among coarse vertices by its interpolation weights,
+    which preserves the total mass and its centre.
 
-    SceneError or MeshError if ``mesh`` is faulty, has no fewer vertices, fills another space, or
-    has a vertex that no vertex of the scene is near to, or if an effect does not suit it.
+    SceneError or MeshError if ``mesh`` is faulty, has no fewer vertices, has another bounding box,
+    has a vertex that is near no vertex of the scene, or if an effect does not suit it.
     """
     own, where = scene.mesh, f"scene '{scene.config.name}': the coarser mesh"
     kinds = [CELLS[len(each.tetrahedra) > 0] for each in (mesh, own)]
     if mesh.vertices >= own.vertices or kinds[0] != kinds[1]:
-        required = f"fewer than {own.vertices} vertices and {kinds[1]}"
-        raise SceneError(f"{where} has {mesh.vertices} vertices and {kinds[0]}, not {required}")
+        required = f"required are fewer than {own.vertices} vertices and {kinds[1]}"
+        raise SceneError(f"{where} has {mesh.vertices} vertices and {kinds[0]}; {required}")
     check_mesh(mesh, where)
     ends = [np.array([each.points.min(axis=0), each.points.max(axis=0)]) for each in (mesh, own)]
     if (apart := np.abs(ends[0] - ends[1]).max()) > APART * own.extent:
-        raise SceneError(f"{where} ends {apart:.3g} m from the scene's: in another unit of length?")
+        raise SceneError(f"{where} ends {apart:.3g} m from the scene's: check its unit of length")
     matrix = interpolation(mesh, own.points)
     masses = matrix.T @ scene.masses
     if not masses.min() > 0.0:
         fault = f"no vertex of the scene's mesh is near its vertex {int(masses.argmin())}"
-        raise SceneError(f"{where}: {fault}: it needs larger elements everywhere")
+        raise SceneError(f"{where}: {fault}; use a mesh with larger elements everywhere")
     near = cKDTree(mesh.points).query(own.points)[1]
     effects = [_selecting(each.model_dump(), near) for each in scene.config.effects]
     found = tuple(effect_config(each, i) for i, each in enumerate(effects))
@@ -104,7 +104,7 @@ def _selecting(keys: Any, near: np.ndarray, selects: bool = False) -> Any:
 def grids(scene: Scene, parts: Sequence[float]) -> list[Coarser]:
     """Return ``scene`` on grids with these ``parts`` of its cells along a side, the finest first.
 
-    Without a generated grid there are none; grids that are no coarser are left out.
+    The list is empty if the mesh was not generated; grids that are not coarser are left out.
     """
     config = scene.config.mesh
     if not isinstance(config, GeneratedMesh):
@@ -115,16 +115,16 @@ def grids(scene: Scene, parts: Sequence[float]) -> list[Coarser]:
 
 
 def spacing(mesh: Mesh) -> float:
-    """Mean spacing of the vertices of ``mesh``, in a unit that two meshes of a body share."""
+    """Return the mean spacing of the vertices, up to a factor that depends only on the body."""
     solid = len(mesh.tetrahedra)
     return float(solid ** (-1 / 3) if solid else len(mesh.triangles) ** (-1 / 2))
 
 
 def mesh_error(spacings: Sequence[float], runs: Sequence[np.ndarray]) -> float | None:
-    """Estimate the error of the finest of three meshes, relative to the motion, by Richardson.
+    """Estimate the relative error due to the finest of three meshes (Richardson extrapolation).
 
-    With an error C h^p of a mesh of spacing h, the differences of three runs tell C and p; None if
-    the order p is outside `ORDERS`, or nothing moves.
+    If a mesh of spacing h has the error C h^p, the differences of three runs determine C and p.
+    The result is None if the order p is outside `ORDERS`, or nothing moves.
 
     spacings : of three meshes, the finest first
     runs : (F + 1, N, 3) m each, converged, at the vertices of the finest mesh
@@ -146,10 +146,10 @@ def mesh_error(spacings: Sequence[float], runs: Sequence[np.ndarray]) -> float |
 def error_of_mesh(
     run: np.ndarray | None, coarser: Sequence[Coarser], runs: Sequence[np.ndarray | None]
 ) -> float | None:
-    """Estimate the relative error of the mesh of ``run``; None if unknown, see `mesh_error`.
+    """Estimate the relative error due to the mesh of ``run``; None if unknown, see `mesh_error`.
 
     run : (F + 1, N, 3) m, converged, on the scene's mesh; None if it does not converge
-    coarser, runs : coarser meshes, and converged runs on them at the scene's vertices, of which the
+    coarser, runs : coarser meshes, and converged runs on them at the scene's vertices; only the
         first and the last are used
     """
     found = [run, *(runs[i] for i in (0, -1) if len(runs) > 1)]
@@ -163,8 +163,8 @@ def error_of_mesh(
 def interpolation(mesh: Mesh, points: np.ndarray) -> sparse.csr_array:
     """Return the matrix (P, N) that interpolates values at the vertices of ``mesh`` linearly.
 
-    Each of the ``points`` (P, 3) m gets the barycentric coordinates of the point of the mesh that
-    is nearest to it, at rest: non-negative weights with sum one on the vertices of one element.
+    The weights of each of the ``points`` (P, 3) m are barycentric coordinates of the nearest point
+    of the mesh at rest: non-negative weights with sum one on the vertices of one element.
     """
     cells = mesh.tetrahedra if len(mesh.tetrahedra) else mesh.triangles
     corners = mesh.points[cells]
@@ -173,7 +173,7 @@ def interpolation(mesh: Mesh, points: np.ndarray) -> sparse.csr_array:
     chosen, weights = np.zeros(len(points), np.int64), np.empty((len(points), cells.shape[1]))
     distance, least = np.full(len(points), np.inf), np.empty(len(points))
     inside = INSIDE * mesh.extent
-    # elements of about one size at a time: a large one would widen the search among all
+    # search elements of similar sizes together: one large element would widen every search
     sizes = np.floor(np.log2(radii))
     for own in (np.flatnonzero(sizes == size) for size in np.unique(sizes)):
         tree, count, radius = cKDTree(centres[own]), min(FIRST, len(own)), radii[own].max()
@@ -187,7 +187,7 @@ def interpolation(mesh: Mesh, points: np.ndarray) -> sparse.csr_array:
                 rows, best, closer = rows[nearer], best[nearer], part[nearer]
                 chosen[closer], weights[closer] = own[near[rows, best]], found[rows, best]
                 distance[closer] = apart[rows, best]
-                # an element that was not tried is no nearer than its centre less its radius
+                # lower bound for elements not tried: distance of the centre minus radius
                 least[part] = far[:, -1] - radius
             more = count < len(own)
             left = left[distance[left] > np.maximum(least[left], inside)] if more else left[:0]
@@ -198,14 +198,14 @@ def interpolation(mesh: Mesh, points: np.ndarray) -> sparse.csr_array:
 
 
 def _nearest(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Barycentric coordinates (P, c, m) of the nearest points of elements, and distances (P, c) m.
+    """Return barycentric coordinates (P, c, m) of nearest points in elements, distances (P, c) m.
 
     corners : (P, c, m, 3) m, of c elements for each of the ``points`` (P, 3) m
     """
     size = corners.shape[2]
     weights = np.zeros(corners.shape[:3])
     distance = np.full(corners.shape[:2], np.inf)
-    # the nearest point lies inside the element, a side, an edge, or is a corner
+    # the nearest point lies inside the element, in a side or an edge, or is a corner
     for part in (p for n in range(size, 0, -1) for p in combinations(range(size), n)):
         first, others = corners[:, :, part[0]], corners[:, :, part[1:]]
         edges = others - first[:, :, None]

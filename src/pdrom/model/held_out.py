@@ -1,8 +1,8 @@
-"""Variations of a scene's motion: held-out motions test a reduction, further ones may train it.
+"""Variants of a scene with other trajectories, for tests or for training of a reduced model.
 
-Three held-out motions differ from the training motion by the same rule for all scenes. The rule was
-chosen by one number only: the error of the recorded training motion ("playback") when it is used as
-a prediction of the held-out motion. No run of a reduced model influenced the choice.
+The three test trajectories of a scene differ from its training trajectory by a rule that is the
+same for all scenes. The rule was chosen by one number only: the error of replaying the training
+trajectory instead of simulating. No run of a reduced model influenced the choice.
 """
 
 from collections.abc import Sequence
@@ -19,25 +19,25 @@ from pdrom.model.mesh.types import Length
 HeldOutMotion = Literal["heldout", "kick", "stiffness"]
 MOTIONS: tuple[HeldOutMotion, ...] = get_args(HeldOutMotion)
 FIRST = MOTIONS[0]
-PLAYBACK = "playback"  # method in tables: the recorded training motion as a guess of a held-out one
-FASTER = 0.75  # duration of handle motions in "kick", relative to the training motion
-# Motion -> degrees by which gravity turns towards an axis, and index of the axis in ``kick_axes``.
+PLAYBACK = "playback"  # method in tables: replaying the training trajectory instead of simulating
+FASTER = 0.75  # duration of handle motions in "kick", relative to the training trajectory
+# Test -> degrees by which gravity turns towards an axis, and index of the axis in ``kick_axes``.
 TILTS = {"heldout": (-20.0, 0), "kick": (30.0, 0), "stiffness": (20.0, -1)}
-# Motion -> sign of the pins' displacement along an axis, and index of the axis in ``kick_axes``.
+# Test -> sign of the pins' displacement along an axis, and index of the axis in ``kick_axes``.
 CARRIED = {"heldout": (1.0, 0), "stiffness": (-1.0, -1)}
-CARRY_S = 0.5  # duration of the motion of pins, s
-FURTHER = 20261125  # first of the three numbers that seed a motion of `HeldOut.further`
+CARRY_S = 0.5  # duration of the pins' displacement, s
+FURTHER = 20261125  # first of the three numbers that seed a trajectory of `HeldOut.further`
 
 
 class HeldOut(ConfigModel):
-    """Settings of the held-out (test) motions of a scene; changes are along axes ``kick_axes``.
+    """Settings of the test trajectories of a scene; changes are along the axes ``kick_axes``.
 
-    Motion "heldout" multiplies frame numbers of effects by ``frames_factor``, moves pins by
-    ``carry`` (m), turns gravity. Motion "kick" adds a random initial velocity of ``kick`` (m/s, by
-    ``seed``), makes handles faster (`FASTER`), turns gravity more and the other way. "stiffness"
-    multiplies the weights of all constraints by ``stiffness``, moves handles and pins in other
-    directions, turns gravity towards another axis and adds an initial velocity by another seed.
-    Changes of gravity, handles or pins do not apply to scenes without them.
+    Test "heldout" multiplies frame numbers of effects by ``frames_factor``, moves pins by ``carry``
+    (m) and turns gravity. Test "kick" adds a random initial velocity of ``kick`` (m/s, by
+    ``seed``), makes handles faster (`FASTER`) and turns gravity further in the opposite direction.
+    Test "stiffness" multiplies the weights of all constraints by ``stiffness``, moves handles and
+    pins in other directions, turns gravity towards another axis and adds an initial velocity by
+    another seed. Changes of gravity, handles or pins do not apply to scenes without them.
     """
 
     frames_factor: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.25
@@ -50,7 +50,7 @@ class HeldOut(ConfigModel):
     def variant(
         self, effects: Sequence[EffectConfig], motion: HeldOutMotion, time_step: float
     ) -> tuple[EffectConfig, ...]:
-        """Effects of the held-out ``motion``, made from the ``effects`` of the training motion."""
+        """Return the effects of the test ``motion``, given the ``effects`` of the training."""
         own = [self._changed(effect, motion, time_step) for effect in effects]
         if motion != FIRST and self.kick:
             seed = (self.seed + MOTIONS.index(motion)) % 2**63
@@ -61,11 +61,11 @@ class HeldOut(ConfigModel):
     def further(
         self, effects: Sequence[EffectConfig], seed: int, time_step: float
     ) -> tuple[EffectConfig, ...]:
-        """Effects of a further motion, random by ``seed``, for training and never for tests.
+        """Return the effects of a further training trajectory, random with this ``seed``.
 
-        It has an initial velocity of 0.5 to 2 times ``kick``, gravity turned by up to 45 degrees,
-        frame numbers of effects times 0.7 to 1.4, weights of the constraints times 0.4 to 2.7, and
-        pins that move by up to ``carry``.
+        The initial velocity is 0.5 to 2 times ``kick``, gravity is turned by up to 45 degrees,
+        frame numbers of effects are multiplied by 0.7 to 1.4, weights of the constraints by 0.4 to
+        2.7, and pins move by up to ``carry``. These trajectories are never used for tests.
         """
         rng = np.random.default_rng([FURTHER, self.seed, seed])
         axes = ["xyz".index(axis) for axis in self.kick_axes]
@@ -97,7 +97,7 @@ class HeldOut(ConfigModel):
             effect = redirected
             if isinstance(effect, GroupConfig):
                 return effect.model_copy(update={"weight": self.stiffness * effect.weight})
-        elif redirected != effect:  # true of handles (effects that move vertices) only
+        elif redirected != effect:  # only handles (effects that move vertices) change
             effect = effect.with_frames_scaled(FASTER)
         degrees, place = TILTS[motion]
         effect = effect.tilted(degrees, axes, place)

@@ -12,8 +12,8 @@ def squared_norms(p: np.ndarray) -> np.ndarray:
 def relative_errors(p: np.ndarray, p_hat: np.ndarray, roundoff: float) -> list[float | None]:
     """Return four || p - p_hat ||_F / || p ||_F over n frames: of all entries, of x, of y, of z.
 
-    An error is None if || p ||_F is at round-off level (a relative error is then meaningless) or if
-    p_hat is not finite.
+    An error is None if || p ||_F is as small as its rounding errors (a relative error is then
+    meaningless) or if p_hat is not finite.
 
     p, p_hat : (n, rows, 3) projections and their approximations
     roundoff : estimated Frobenius norm of the rounding errors in p
@@ -33,10 +33,10 @@ def shape_residuals(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return differences R q + t - q_ref in each of F frames after the best rigid motion R, t.
 
-    R is the rotation, never a reflection, with the least mass-weighted squares (Kabsch 1976), t
+    R is the rotation, never a reflection, that minimises mass-weighted squares (Kabsch 1976), t
     aligns the centres of mass. ``positions`` q and ``reference`` q_ref are (F, N, 3) m, finite,
-    ``masses`` (N,) kg. The differences (F, N, 3) are divided by the second result, (F,) m, which is
-    at least every coordinate of the frame, as their squares in metres may overflow.
+    ``masses`` (N,) kg. The differences (F, N, 3) are divided by the second result, (F,) m, because
+    their squares in metres may overflow. It is at least as large as every coordinate of the frame.
     """
     largest = np.abs(positions).max(initial=0.0, axis=(1, 2), keepdims=True)
     scale = np.maximum(largest, np.abs(reference).max(initial=0.0, axis=(1, 2), keepdims=True))
@@ -57,9 +57,9 @@ def shape_differences(
 ) -> np.ndarray:
     """Return how far two runs differ in shape in each frame, as norms (F,) m.
 
-    D_f(a, b)^2 is the least sum over the vertices of m_i / m |R a_i + t - b_i|^2, R a rotation, t a
-    translation, m the mean mass: of equal masses, the norm of all differences. ``positions`` a are
-    (F, N, 3) m, or (N, 3) m of all frames, ``reference`` b (F, N, 3) m, ``masses`` (N,) kg.
+    D_f(a, b)^2 is the least sum over the vertices of m_i / m |R a_i + t - b_i|^2 for all rotations
+    R and translations t, with the mean mass m. ``positions`` a are (F, N, 3) m, or (N, 3) m in all
+    frames, ``reference`` b (F, N, 3) m, ``masses`` (N,) kg.
     """
     positions, root = np.broadcast_to(positions, reference.shape), np.sqrt(masses / masses.mean())
     norms = [np.zeros(0)]
@@ -71,9 +71,9 @@ def shape_differences(
 
 
 def affine_residuals(rest: np.ndarray, reference: np.ndarray, masses: np.ndarray) -> np.ndarray:
-    """Return norms (F,) m as `shape_differences`, from the best affine image of the shape ``rest``.
+    """Return norms (F,) m of ``reference`` minus the best affine image of the shape ``rest``.
 
-    ``rest`` is (N, 3) m, ``reference`` (F, N, 3) m, ``masses`` (N,) kg.
+    Norms are those of `shape_differences`; ``rest`` (N, 3), ``reference`` (F, N, 3), m; masses, kg.
     """
     root = np.sqrt(masses / masses.mean())[:, None]
     q, sigma, _ = np.linalg.svd(root * np.c_[rest, np.ones(len(rest))], full_matrices=False)
@@ -91,8 +91,8 @@ def deformation_error(
     """Return the error of a run's shapes, relative to the deformation of the reference.
 
     It is 0 for the reference moved rigidly in any way, 1 for a body that does not deform at all,
-    and None if the body is rigid to `RIGID` of its size or the reference has no frame. It does not
-    see errors of the rigid motion: state the error of the positions as well. ``positions`` and
+    and None if the body is rigid up to `RIGID` of its size or the reference has no frame. Rigid
+    motions do not change it, so that the position error should be given as well. ``positions`` and
     ``reference`` are (F, N, 3) m, without the initial state, ``rest`` (N, 3) m, ``masses`` (N,) kg.
     """
     difference = shape_differences(positions, reference, masses)
@@ -101,30 +101,29 @@ def deformation_error(
 
 
 def rest_size(rest: np.ndarray, masses: np.ndarray) -> float:
-    """Norm, m, of the distances of the vertices at ``rest`` (N, 3) m from their centre of mass.
+    """Return the norm, m, of distances of vertices at ``rest`` (N, 3) m from their centre of mass.
 
-    They are weighted by ``masses`` (N,) kg over their mean.
+    Squared distances are weighted by ``masses`` (N,) kg divided by their mean.
     """
     centred = rest - masses @ rest / masses.sum()
     return float(np.linalg.norm(np.sqrt(masses / masses.mean())[:, None] * centred))
 
 
 def relative_deformation(difference: np.ndarray, deformed: np.ndarray, size: float) -> float | None:
-    """Return `deformation_error` from the norms (F,) m of both runs' differences in shape.
+    """Return `deformation_error` from `shape_differences` to a reference, each (F,) m.
 
-    ``deformed`` (F,) m are the norms for the rest shape in place of the run, ``size`` m is its
-    `rest_size`.
+    ``difference`` belongs to the run, ``deformed`` to the rest shape; ``size``, m, is `rest_size`.
     """
     whole = float(np.linalg.norm(deformed))
     if not whole > RIGID * size * np.sqrt(len(deformed)):
         return None
-    return float(np.hypot.reduce(difference)) / whole  # as squares may overflow
+    return float(np.hypot.reduce(difference)) / whole  # squares may overflow
 
 
 def trajectory_error(difference: np.ndarray, displacement: np.ndarray) -> float | None:
     """Return the relative error || Q_red - Q_fom || / || Q_fom - Q_0 || over F frames of a run.
 
-    Q are positions of the reduced or full-order run; None if the full order stays at Q_0 or F = 0.
+    Q are positions of the reduced or full-order run; None if Q_fom stays at Q_0 or F = 0.
 
     difference, displacement : (F,) m, Frobenius norms of Q_red - Q_fom, Q_fom - Q_0 in each frame
     """

@@ -1,4 +1,4 @@
-"""Full-order runs, written to HDF5 frame by frame, and runs that end if they become unstable."""
+"""Full-order runs, written to HDF5 frame by frame, and runs that end when they blow up."""
 
 import logging
 import os
@@ -24,16 +24,16 @@ from pdrom.model.scene import Scene
 
 log = logging.getLogger(__name__)
 
-# A run ends as a blow-up if its bounding box exceeds this multiple of that of the rest shape.
+# A run has blown up if its bounding box is more than this many times that of the rest shape.
 BLOWUP_EXTENT = 100.0
 TRIED, WINDOW, NEAR = (20, 50, 100, 200, 500, 1000, 2000), 5, 0.01  # of `remedy`
-WORK = 20_000_000  # most evaluations of the trial times vertices: about 10 s
+WORK = 20_000_000  # limit of evaluations times vertices in a trial of `remedy`: about 10 s
 
 
 def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any) -> np.ndarray:
     """Return positions (F + 1, N, 3) m of a run of ``scene``, the initial positions first.
 
-    ``perturbation`` (N, 3) m is added to them; ``stepper`` are options of `Scene.stepper`.
+    ``perturbation`` (N, 3) m changes the initial ones; ``stepper`` are options of `Scene.stepper`.
     """
     start = scene.initial_state(perturbation)
     return followed(scene.stepper(**stepper), start, scene.config.frames)
@@ -49,9 +49,9 @@ class ConvergedStepper(Stepper):
     """Full-order step loop that minimises the objective of every frame up to a tolerance.
 
     ``changes`` and ``evaluations`` list what `minimise` returns for the frames computed so far;
-    ``converged`` says whether each reached the ``tolerance``, m, that held in it.
+    ``converged`` says whether all of these frames reached the ``tolerance``, m.
     A minimisation starts from the positions that inertia predicts or, if ``from_last``, from those
-    at the beginning of the frame; it may find another minimum then.
+    at the beginning of the frame, which may lead to another minimum.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class ConvergedStepper(Stepper):
         self.changes.append(change)
         self.evaluations.append(evaluations)
         after, seconds = self._finish(state, y, frame, anchors), np.zeros(len(PHASES))
-        seconds[1] = perf_counter() - started  # its phases are not told apart
+        seconds[1] = perf_counter() - started  # the phases are not timed separately
         return after, FrameReport(np.empty(0), seconds)
 
 
@@ -102,12 +102,12 @@ def converged_run(
     on_frame: Callable[[int, FrameReport], None] = lambda frame, report: None,
     from_last: bool = False,
 ) -> np.ndarray | None:
-    """Positions (F + 1, N, 3) m of a run of ``scene`` in which every frame has converged.
+    """Return positions (F + 1, N, 3) m of a run of ``scene`` in which every frame has converged.
 
-    Initial positions come first. None if, after ``limit`` evaluations of a frame's objective, one
-    more iteration would move a vertex by over ``tolerance`` times the mesh's longest side.
-    ``on_frame`` is called after each frame with its number and report; ``from_last``: see
-    `ConvergedStepper`.
+    Initial positions come first. The result is None if a frame does not converge: after ``limit``
+    evaluations of its objective, one more iteration would change a coordinate by more than
+    ``tolerance`` times the mesh's longest side. ``on_frame`` is called after each frame with its
+    number and report; ``from_last``: see `ConvergedStepper`.
     """
     best = ConvergedStepper(scene, scene.system, tolerance, limit, from_last)
     state = scene.initial_state()
@@ -120,9 +120,9 @@ def converged_run(
 
 
 def remedy(scene: Scene, state: State, frame: int, allowed: float) -> str:
-    """Return how many accelerated iterations bring ``frame`` from ``state`` within 1 %, in words.
+    """Describe how many accelerated iterations from ``state`` reduce the error of ``frame`` to 1 %.
 
-    If ``allowed`` is less, within that, but not below 0.01 %; large meshes have fewer trials.
+    A smaller ``allowed`` error (not below 0.01 %) replaces 1 %. Large meshes have fewer trials.
     """
     start, window = state.positions, scene.config.anderson_window or WINDOW
     near, most = max(1e-4, min(NEAR, allowed)), max(TRIED[0], WORK // scene.mesh.vertices)
@@ -154,15 +154,15 @@ def run(
 
     snapshot_frames : name of a constraint group -> frames (ascending) in which its projections p in
         the last local step are stored
-    with_mesh : whether the mesh is written, too, so that the file can be used without the scene
+    with_mesh : whether the mesh is also written, so that the file can be used without the scene
     on_frame : called after each frame with its number and report
     path : HDF5 file that is written
-    begun : states and reports after the first frames, which are not computed then
+    begun : known states and reports after the first frames, which are not computed again
     method : description of a run that does not begin at the initial state of ``scene``
-    loop : step loop of the scene; errors of frames that it estimates are written, too, else nan
+    loop : step loop of the scene; errors of frames that it estimates are written, otherwise nan
     """
     frames, asked = scene.config.frames, scene.config.iterations
-    tracked = asked if isinstance(asked, int) else 0  # else, each frame has its own number
+    tracked = asked if isinstance(asked, int) else 0  # 0: the number differs between frames
     loop, state = loop or scene.stepper(), scene.initial_state()
     with write_hdf5(path) as file:
         if with_mesh:
@@ -236,10 +236,10 @@ class _SnapshotRecorder:
 class Frame:
     """State at the end of a frame in which all positions are finite.
 
-    state : state as the step loop has it: positions, or coordinates in a position subspace
+    state : state of the step loop: positions, or coordinates in a position subspace
     positions : (N, 3) m of the vertices
     extent : longest side of the bounding box, divided by `BoundedRun.unit`
-    seconds : time of the frame, with the positions of the vertices
+    seconds : time to compute the frame, including the positions of the vertices
     """
 
     number: int
@@ -252,9 +252,9 @@ class Frame:
 
 @dataclass
 class BoundedRun:
-    """Iterator over the frames of a run, which ends if the run blows up.
+    """Iterate over the frames of a run until it blows up.
 
-    run : yields the states and reports after frames, as `Stepper.run`, maybe more than are yielded
+    run : iterator of states and reports after frames, as from `Stepper.run`, maybe of more frames
     limit : largest allowed ratio of the longest side of the bounding box to ``unit`` (m)
     positions : function that maps the positions in states of ``run`` to vertex positions (N, 3) m
     blowup_frame : first frame that is not finite (not yielded) or exceeds the limit, else None
@@ -276,7 +276,7 @@ class BoundedRun:
                 before = perf_counter()
                 q = self.positions(self.state.positions)
                 seconds = float(report.seconds.sum()) + perf_counter() - before
-                # rows of x, y and z: along them, NumPy is thirty times as fast
+                # NumPy is thirty times as fast along contiguous rows of x, y and z
                 extent = float(np.ptp(np.ascontiguousarray(q.T), axis=1).max()) / self.unit
             if not np.isfinite(q).all():
                 self.blowup_frame = number

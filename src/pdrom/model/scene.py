@@ -1,7 +1,7 @@
 """Scenes: a mesh and a list of effects, their typed configuration, and their step loop.
 
 Effects that prescribe contradictory positions raise an error; implausible effects are logged
-as warnings. Masses are lumped: all vertices have equal masses, or selected ones their own."""
+as warnings. Masses are lumped at the vertices and may differ between selected vertices."""
 
 import logging
 from collections.abc import Sequence
@@ -53,7 +53,7 @@ class MassConfig(ConfigModel):
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:
         if (self.vertex_mass is None) == (self.density is None):
-            raise ValueError("either vertex_mass or density is required")
+            raise ValueError("give either vertex_mass or density: exactly one is required")
         return self
 
 
@@ -63,7 +63,7 @@ class ReductionPlan(ConfigModel):
     train: Annotated[int, Field(ge=2, le=100_000)]
 
 
-# Limit of vertices times frames, for disk and memory: 1600 vertices in 100,000 frames.
+# Limit of vertices times frames, which bounds disk space and memory (1600 times 100,000).
 MAX_VERTEX_FRAMES = 160_000_000
 
 
@@ -87,7 +87,7 @@ class SceneConfig(ConfigModel):
     def _consistent(self) -> Self:
         groups = self.groups
         if not groups:
-            raise ValueError("effects list no constraint group: there is nothing to project")
+            raise ValueError("effects list no constraint group: add one (spring, strain, ...)")
         if len(set(groups)) < len(groups):
             doubled = {group for group in groups if groups.count(group) > 1} & {"volume", "area"}
             added = "; young with poisson adds volume or area" if doubled else ""
@@ -100,16 +100,16 @@ class SceneConfig(ConfigModel):
             even = (self.frames + 1) // 2
             if plan.train > even:
                 raise ValueError(
-                    f"reduce.{group}.train = {plan.train}: only {even} even frames in {self.frames}"
+                    f"reduce.{group}.train = {plan.train}: allowed are up to {even} (even frames)"
                 )
         return self
 
     @property
     def count(self) -> int:
-        """Number of iterations of each frame; SceneError if every frame has its own."""
+        """Number of iterations of each frame; SceneError if it differs between frames."""
         if isinstance(self.iterations, int):
             return self.iterations
-        fault = "only runs in full order iterate until an error; a number is required here"
+        fault = "only full-order runs iterate until an estimated error; give a number here"
         raise SceneError(f"scene '{self.name}': iterations = {dict(self.iterations)}: {fault}")
 
     @property
@@ -158,12 +158,12 @@ class SceneConfig(ConfigModel):
         return self.model_copy(update=changes | {"effects": effects})
 
     def heldout_variant(self, motion: HeldOutMotion = FIRST) -> Self:
-        """Configuration of the scene with the held-out ``motion`` (see `HeldOut`)."""
+        """Return the configuration of the scene for the test trajectory ``motion`` (`HeldOut`)."""
         effects = self.held_out.variant(self.effects, motion, self.time_step)
         return self.model_copy(update={"effects": effects})
 
     def training_variant(self, seed: int) -> Self:
-        """Configuration of the scene with another training motion, drawn at random by ``seed``."""
+        """Return the configuration for another training trajectory, random with this ``seed``."""
         effects = self.held_out.further(self.effects, seed, self.time_step)
         return self.model_copy(update={"effects": effects})
 
@@ -192,10 +192,10 @@ class Scene:
 
     @classmethod
     def build(cls, config: SceneConfig, mesh: Mesh, masses: np.ndarray | None = None) -> "Scene":
-        """Return the scene of ``config`` on ``mesh``; ``masses`` (N,) kg replace its own if given.
+        """Return the scene of ``config`` on ``mesh``, with ``masses`` (N,) kg instead if given.
 
-        MeshError if the mesh is faulty, SceneError if a selection is empty, frames are too many, or
-        effects are in conflict.
+        MeshError if the mesh is faulty, SceneError if a selection is empty, there are too many
+        frames, or effects contradict each other.
         """
         check_mesh(mesh, config.name)
         if config.frames * mesh.vertices > MAX_VERTEX_FRAMES:
@@ -226,18 +226,18 @@ class Scene:
     def changed(self, **keys: Any) -> "Scene":
         """Return the scene with ``keys`` of its configuration changed; mesh and masses are kept.
 
-        SceneError if a changed effect does not suit the mesh or is in conflict with another one.
+        SceneError if a changed effect does not suit the mesh or contradicts another effect.
         """
         config = self.config.model_copy(update=keys)
         return self._bound(config, self.mesh, self.masses)
 
     def iterated(self, iterations: int | Until, window: int = 0) -> "Scene":
-        """Return the scene with numbers of iterations and of Anderson differences (0: none)."""
+        """Return the scene with these ``iterations`` and Anderson ``window`` (0: none)."""
         changes = {"iterations": iterations, "anderson_window": window}
         return replace(self, config=self.config.model_copy(update=changes))
 
     def _check_holds(self) -> None:
-        """Raise SceneError if two effects prescribe different motions of a vertex in one frame."""
+        """Raise SceneError if two effects prescribe different positions of a vertex in a frame."""
         for first, second in combinations(self.boundaries, 2):
             shared = np.intersect1d(first.vertices, second.vertices)
             if len(shared) == 0 or not (first.moves or second.moves):
@@ -248,7 +248,7 @@ class Scene:
                 if first.active(frame) and second.active(frame):
                     raise SceneError(
                         f"scene '{self.config.name}': vertex {shared[0]} is held by "
-                        f"'{first.name}' and by '{second.name}' in frame {frame}"
+                        f"'{first.name}' and by '{second.name}' in frame {frame}: change one"
                     )
 
     def log_holds(self) -> None:
@@ -266,7 +266,7 @@ class Scene:
             elif count >= FEW:
                 log.info("%s (select: %s)", counted, side)
             else:
-                advice = "a list of vertices selects more"
+                advice = "list vertices to select more"
                 log.warning("%s, fewer than %d (select: %s; %s)", counted, FEW, side, advice)
         log_obstructed(self)
 
@@ -317,8 +317,8 @@ class Scene:
     ) -> Stepper:
         """Return the step loop, with ``local_steps`` in place of the groups if given.
 
-        ``system`` replaces the global system; ``track_objective`` adds objectives to frame reports;
-        with ``estimate``, or iterations until an error, the loop is an `EstimatingStepper`.
+        ``system`` replaces the global system; ``track_objective`` adds objectives to frame reports.
+        If ``estimate`` is true or frames iterate until an error, it is an `EstimatingStepper`.
         """
         asked, own = self.config.iterations, (self.mesh.extent, self.config.frames)
         until = asked if isinstance(asked, Until) and local_steps is None else None
@@ -343,12 +343,12 @@ class Scene:
 
 
 def _place(boundary: base.Boundary) -> base.EffectConfig:
-    """Configuration of ``boundary`` without vertices and last frame; equal ones move alike."""
+    """Return the configuration that determines how the vertices of ``boundary`` move."""
     return boundary.config.model_copy(update={"select": None, "until": None})
 
 
 def log_obstructed(scene: Scene) -> None:
-    """Log a warning if targets of held vertices are inside an obstacle: contacts cannot move them.
+    """Log a warning if held vertices have targets inside an obstacle: contacts do not move them.
 
     If a hold begins in a later frame, its vertices are assumed to be at rest until then, except for
     corrections by obstacles.

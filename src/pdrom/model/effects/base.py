@@ -59,13 +59,13 @@ class EffectConfig(ConfigModel):
         """Raise ValueError if the effect is unstable with a time step of ``time_step`` s."""
 
     def redirected(self, axes: Sequence[int]) -> Self:
-        """Return a changed copy of a handle: motion reversed or turned in the plane of ``axes``."""
+        """Return the effect; handles move in reverse or turned in the plane of ``axes``."""
         return self
 
     def tilted(self, degrees: float, axes: Sequence[int], place: int) -> Self:
         """Return the effect; gravity is turned by ``degrees``, other effects do not change.
 
-        Gravity turns towards entry ``place`` of the list of ``axes`` (0, 1, 2) not parallel to it.
+        Of the ``axes`` (0: x) not parallel to gravity, it turns towards number ``place``.
         """
         return self
 
@@ -130,7 +130,7 @@ class Boundary(Effect):
     vertices: np.ndarray
     """All vertices that the effect holds in any frame, ascending (n,) int64."""
     side: str | None = None
-    """Name of the side of the rest shape if the vertices were selected by one; else None."""
+    """Name of the side of the rest shape that selected the vertices; None if no side did."""
     moves: bool
     """Whether the targets change from frame to frame."""
 
@@ -154,7 +154,7 @@ class Boundary(Effect):
         return positions[self.held(frame)]
 
     def takes_hold(self, frame: int) -> bool:
-        """Return whether a hold begins in ``frame``; its targets depend on the positions then."""
+        """Return whether a hold, whose targets depend on present positions, begins in ``frame``."""
         return True
 
     def path(self, frames: range, anchor: np.ndarray) -> np.ndarray:
@@ -190,7 +190,7 @@ class Contact(Effect):
 
     @abstractmethod
     def correct(self, positions: np.ndarray, before: np.ndarray) -> None:
-        """Correct ``positions`` (N, 3) m in place; ``before`` (N, 3) m are those before the frame.
+        """Correct ``positions`` (N, 3) m in place; ``before`` (N, 3) m are from before the frame.
 
         Contacts are applied in the order of the scene's effects.
         """
@@ -217,7 +217,7 @@ def effect_config(entry: Any, index: int) -> EffectConfig:
     if isinstance(entry, EffectConfig):
         return entry
     if not isinstance(entry, dict) or not isinstance(entry.get("effect"), str):
-        raise ValueError(f"effects[{index}] = {shown(entry, 60)}: a mapping with a key 'effect'")
+        raise ValueError(f"effects[{index}] = {shown(entry, 60)}: no mapping with a key 'effect'")
     name = entry["effect"]
     try:
         model = EFFECTS.load(name).Config
@@ -261,8 +261,8 @@ def held_path(
 
     These frames end before the first in which the set of held vertices changes or a hold begins,
     since targets of that hold depend on positions that are not yet known. ``positions`` (N, 3) m
-    are those at the beginning of the first frame, ``anchors`` those returned for the frame before.
-    A hold without an anchor is taken to begin in the first frame.
+    are from the beginning of the first frame, ``anchors`` are the result for the previous frame.
+    A hold without an anchor is assumed to begin in the first frame.
     """
     frame, now = frames.start, list(anchors) or [None] * len(boundaries)
     for i, b in enumerate(boundaries):
@@ -290,4 +290,4 @@ def held_path(
         path = paths[0]
     else:
         path = np.concatenate([np.empty((known, 0, 3)), *paths], axis=1)[:, first]
-    return vertices, np.array(path, order="C"), tuple(now)  # one type, for which Numba compiles
+    return vertices, np.array(path, order="C"), tuple(now)  # Numba compiles for one memory layout

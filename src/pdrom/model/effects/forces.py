@@ -46,7 +46,7 @@ class Damping(Force):
     """Acceleration -c v, with the velocity v at the beginning of the frame (explicit)."""
 
     class Config(EffectConfig):
-        """Damping ``rate`` c in 1/s; a time step h must be stable: c h < 2, larger c is refused."""
+        """Damping ``rate`` c in 1/s; c is refused unless c h < 2 (stability with time step h)."""
 
         effect: Literal["damping"] = "damping"
         rate: Annotated[float, Field(ge=0.0, le=1e3, allow_inf_nan=False)]
@@ -151,7 +151,7 @@ class Velocity(Start):
 class Kick(Start):
     """Random initial velocity: combination of 1, x, y, z, xy, yz, zx with seeded coefficients.
 
-    Coordinates are relative to the mean vertex and to half the longest side. Such polynomials
+    Coordinates are relative to the mean vertex and to half the longest side. These polynomials
     excite slow motions of the whole body, without noise at the scale of elements.
     """
 

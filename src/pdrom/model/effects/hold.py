@@ -151,8 +151,8 @@ class Keyframes(Hold):
     """Held vertices that move as a rigid body from pose to pose and stay in the last one.
 
     Offsets and rotation vectors are interpolated: ``linear``, with a kink at each pose, or
-    ``smooth``, by monotone cubics without overshoot (Fritsch and Butland 1984). As these vectors,
-    not rotations, are interpolated, angles above 180 degrees are possible.
+    ``smooth``, by monotone cubics without overshoot (Fritsch and Butland 1984). Angles above 180
+    degrees are possible, because vectors are interpolated, not rotations.
     """
 
     class Config(HoldConfig):

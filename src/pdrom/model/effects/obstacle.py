@@ -19,7 +19,7 @@ Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class ObstacleConfig(EffectConfig):
-    """Coefficient mu of an obstacle's ``friction``: 0 for none, ``.inf`` (infinity): sticking."""
+    """Coefficient mu of ``friction``: 0 for no friction, ``.inf`` (infinity) for sticking."""
 
     friction: Annotated[float, Field(ge=0.0)] = 0.0
 
@@ -58,7 +58,7 @@ class Obstacle(Contact):
             positions[inside] = lifted - along + self._braked(along, depth)
 
     def _braked(self, along: np.ndarray, depth: np.ndarray) -> np.ndarray:
-        """Return tangential motion ``along`` (n, 3) m, shortened by mu times ``depth`` (n,) m."""
+        """Return ``along`` (n, 3) m, tangential motion, shortened by mu times ``depth`` (n,) m."""
         mu = self.config.friction
         if mu == 0.0:
             return along
@@ -139,7 +139,7 @@ class Sphere(Obstacle):
         return np.where(length > 0.0, arm / np.where(length > 0.0, length, 1.0), UP)
 
     def entries(self, start: np.ndarray, end: np.ndarray) -> Entries:
-        """`Entries` of paths, at the least t with |start + t (end - start) - centre| = radius."""
+        """Return `Entries` at the least t with |start + t (end - start) - centre| = radius."""
         arm, path = start - self.config.centre, end - start
         square = np.einsum("ij,ij->i", path, path)
         inwards = -np.einsum("ij,ij->i", arm, path)
@@ -200,7 +200,7 @@ class Box(Obstacle):
             far = np.where(path != 0.0, far, np.inf)
             axis = near.argmax(axis=1)
             fraction, moved = near[rows, axis], path[rows, axis]
-            # a start that is inside a face by round-off counts as a point on it
+            # a start that is inside a face only by rounding errors counts as a point on it
             on_face = fraction * np.abs(moved) >= -self._slack
         hits = (moved != 0.0) & on_face & (fraction <= 1.0) & (far.min(axis=1) >= fraction)
         points = start + np.clip(np.where(hits, fraction, 0.0), 0.0, None)[:, None] * path

@@ -17,14 +17,14 @@ KNOTS = (0.0, -1.0, 1.0, -1.0, 0.0)
 
 
 class Poke(Boundary):
-    """Moves vertices in turn by 0 -> -a -> a -> -a -> 0 on an axis (amplitude a), then frees them.
+    """Move vertices in turn by 0 -> -a -> a -> -a -> 0 on an axis (amplitude a), then free them.
 
-    Vertices, without those in ``avoid``, are chosen by farthest-point sampling from the centre. The
-    reproduced preprint gives no speeds; amplitude, frames and order are choices of this study.
+    Vertices outside ``avoid`` are chosen by farthest-point sampling from the centre. The reproduced
+    preprint gives no speeds, so that amplitude, frames and order are choices of this study.
     """
 
     class Config(EffectConfig):
-        """``amplitude``, m; ``over``, ``rest``: frames in a vertex's motion, between motions."""
+        """``amplitude``, m; each vertex moves for ``over`` frames, then no vertex for ``rest``."""
 
         effect: Literal["poke"] = "poke"
         amplitude: Length = 0.2
@@ -45,7 +45,7 @@ class Poke(Boundary):
         free = np.setdiff1d(np.arange(mesh.vertices), np.concatenate([[], *avoided]).astype(int))
         if len(free) < config.count:
             raise SceneError(
-                f"poke: count = {config.count}, but only {len(free)} vertices are free"
+                f"poke: count = {config.count}, but only {len(free)} vertices are not in avoid"
             )
         self._order = farthest_points(mesh.points, free, config.count)
         self.vertices = np.sort(self._order)

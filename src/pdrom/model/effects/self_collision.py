@@ -11,7 +11,7 @@ from pdrom.model.mesh.types import MAX_LENGTH, MIN_LENGTH, Mesh
 
 # Largest number of searches for close pairs per frame, and of passes over the pairs per search.
 SEARCHES, SWEEPS = 20, 100
-# Radius of the search for pairs, in thicknesses: separating a pair may bring others too close.
+# Search radius in thicknesses; above 1, as separating a pair may bring other vertices too close.
 REACH = 1.25
 # Passes over the pairs end when no pair of vertices is closer than this times the thickness.
 ENOUGH = 0.95
@@ -20,16 +20,16 @@ COVER = 1.0 / np.sqrt(3.0)
 
 
 class SelfCollision(Contact):
-    """Separates vertices closer than the thickness, except pairs that are as close at rest.
+    """Separate vertices closer than the thickness, except pairs that are as close at rest.
 
-    Close pairs (found by a k-d tree) are moved apart along their connecting line, in proportion to
-    their inverse masses (zero for held vertices); momentum is conserved if none is held. Passes
-    over the pairs, in the order of their vertices, are repeated until all distances are at least
+    Close pairs (found by a k-d tree) are separated along their connecting line, in proportion to
+    their inverse masses (zero for held vertices); momentum is conserved if no vertex is held.
+    Passes over the pairs, in the order of their vertices, are repeated until all distances reach
     `ENOUGH` times the thickness; for many pairs in a small region this may take several frames.
 
-    A pair that changed sides (its connecting line reversed) in the frame is moved back. Only
-    vertices collide: none can pass between others if the thickness is above 0.58 edge lengths and
-    no pair approaches by more than the thickness in a frame.
+    A pair whose connecting line reversed in the frame is moved back. Only vertices collide, but no
+    vertex can pass between others if the thickness is above 0.58 edge lengths and no pair
+    approaches by more than the thickness in a frame.
     """
 
     class Config(EffectConfig):
@@ -91,7 +91,7 @@ class SelfCollision(Contact):
 
 @compiled(error_model="python")
 def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
-    """Move vertex ``pairs`` apart to ``thickness``; return the least distance in the first pass."""
+    """Separate vertex ``pairs`` to ``thickness``; return the least distance in the first pass."""
     first = thickness
     for sweep in range(sweeps):
         closest = thickness
@@ -107,7 +107,7 @@ def _separate(q, before, pairs, inverse_masses, thickness, enough, sweeps):
             length = np.sqrt(ex * ex + ey * ey + ez * ez)
             gap = thickness - distance
             if length > 0.0 and dx * ex + dy * ey + dz * ez <= 0.0:
-                # line i to j is zero or turned >= 90 degrees in the frame: use the line before it
+                # line i to j is zero or has turned by >= 90 degrees: use that before the frame
                 along = (dx * ex + dy * ey + dz * ez) / length
                 dx, dy, dz, distance, gap = ex, ey, ez, length, thickness - along
             elif distance == 0.0:

@@ -109,7 +109,7 @@ def test_files_are_read_as_the_mesh_of_the_scene(tmp_path):
     ("given", "fault"),
     [
         ({"coarser": "none.obj"}, "coarser = 'none.obj': a list is required"),
-        ({"coarser": [cloth(9, 9, "xz")]}, "not fewer than 36 vertices"),
+        ({"coarser": [cloth(9, 9, "xz")]}, "required are fewer than 36 vertices"),
         ({"progress": None}, "progress = None: a function of two arguments is required"),
     ],
 )
