@@ -205,7 +205,7 @@ MESH_CASES = [
     mesh("mesh smaller than a micrometre",
          GROUND.replace("1", "1e-9") + "f 1 2 3\nf 1 3 4\n", "extent 1e-09", "at least 1e-06"),
     mesh("mesh that ends early", PLY.format(n=9) + "0 0 0\n",
-         "cut off", path="meshes/a.ply"),
+         "truncated", path="meshes/a.ply"),
     mesh("index out of range", GROUND + "f 1 2 3\nf 1 3 9\n", "names vertex [0, 2, 8]", "0 to 3"),
     mesh("index zero", GROUND + "f 0 1 2\nf 1 2 3\nf 1 3 4\n", "names vertex [-1, 0, 1]", "0 to 3"),
     mesh("NaN among the points", GROUND.replace("v 1 0 0", "v nan 0 0") + "f 1 2 3\nf 1 3 4\n",

@@ -35,7 +35,7 @@ class EnergyScale:
 
     zero : smallest potential of the forces in the full-order run, J
     peak : largest total energy of the full-order run, J, minus ``zero``
-    own : (`energies` of the full-order run - ``zero``) / ``peak``; empty if ``peak`` is negligible
+    own : (`energies` of this run - ``zero``) / ``peak``; empty if ``peak`` is below rounding errors
     """
 
     scene: Scene
@@ -57,7 +57,7 @@ class EnergyScale:
 
         The n values are those of every `STRIDE`-th frame and the last; inf if the energy overflows.
         A run with a value above one has gained energy that did not come from the initial state or
-        the moving vertices of the full-order run. Empty (0,) if the full-order energy vanishes.
+        the moving vertices of the full-order run. The result is empty (0,) if `own` is empty.
         """
         if not len(self.own):
             return self.own

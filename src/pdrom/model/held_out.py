@@ -50,7 +50,7 @@ class HeldOut(ConfigModel):
     def variant(
         self, effects: Sequence[EffectConfig], motion: HeldOutMotion, time_step: float
     ) -> tuple[EffectConfig, ...]:
-        """Return the effects of the test ``motion``, given the ``effects`` of the training."""
+        """Return effects of the test ``motion``; ``effects`` are those of the training trajectory."""
         own = [self._changed(effect, motion, time_step) for effect in effects]
         if motion != FIRST and self.kick:
             seed = (self.seed + MOTIONS.index(motion)) % 2**63

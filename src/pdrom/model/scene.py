@@ -100,7 +100,7 @@ class SceneConfig(ConfigModel):
             even = (self.frames + 1) // 2
             if plan.train > even:
                 raise ValueError(
-                    f"reduce.{group}.train = {plan.train}: allowed are up to {even} (even frames)"
+                    f"reduce.{group}.train = {plan.train}: the scene has only {even} even frames"
                 )
         return self
 

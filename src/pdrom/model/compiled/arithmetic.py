@@ -68,31 +68,31 @@ def add(builder, a, b):
 
 @_operation(ROW, ROW, ROW)
 def subtract(builder, a, b):
-    """Difference a - b of two rows."""
+    """Return the difference a - b of two rows."""
     return builder.fsub(a, b)
 
 
 @_operation(ROW, ROW, ROW)
 def multiply(builder, a, b):
-    """Product a b of two rows, lane by lane."""
+    """Return the product a b of two rows, lane by lane."""
     return builder.fmul(a, b)
 
 
 @_operation(ROW, ROW, ROW)
 def divide(builder, a, b):
-    """Quotient a / b of two rows, lane by lane."""
+    """Return the quotient a / b of two rows, lane by lane."""
     return builder.fdiv(a, b)
 
 
 @_operation(ROW, _NUMBER, ROW)
 def scaled(builder, s, b):
-    """Product s b of a number s and a row b."""
+    """Return the product s b of a number s and a row b."""
     return builder.fmul(spread(builder, s), b)
 
 
 @_operation(ROW, ROW, _NUMBER, ROW)
 def add_scaled(builder, a, s, b):
-    """Sum a + s b of rows a and b, with a number s."""
+    """Return the sum a + s b of rows a and b, with a number s."""
     return multiply_add(builder, spread(builder, s), b, a)
 
 
@@ -104,7 +104,7 @@ def add_product(builder, a, b, c):
 
 @_operation(ROW, ROW)
 def square_root(builder, a):
-    """Square root of a row, lane by lane."""
+    """Return the square root of a row, lane by lane."""
     return _call(builder, "sqrt", a)
 
 
@@ -116,7 +116,7 @@ def magnitude(builder, a):
 
 @_operation(_NUMBER, ROW)
 def total(builder, row):
-    """Sum of the four numbers of a row, added from the first to the last."""
+    """Return the sum of the four numbers of a row, added from the first to the last."""
     sums = builder.extract_element(row, _lane(0))
     for lane in range(1, WIDTH):
         sums = builder.fadd(sums, builder.extract_element(row, _lane(lane)))

@@ -45,7 +45,7 @@ def _mark(function):
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """Cache on disk: of several processes, one compiles a function and the others wait for it."""
+    """Cache on disk; if several processes need a function, one compiles it and the others wait."""
 
     def load_overload(self, signature, context):
         if (found := super().load_overload(signature, context)) is not None:
@@ -57,7 +57,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             flock(self._held.enter_context(lock.open("w")), LOCK_EX)
         if (found := super().load_overload(signature, context)) is not None:
             self._held.close()
-        elif gc.isenabled():  # collections would take a tenth of the time
+        elif gc.isenabled():  # garbage collection would take 10 % of the time
             gc.disable()
             self._held.callback(gc.enable)
         return found
@@ -71,7 +71,7 @@ def compiled(function=None, **options):
     """Compile ``function``, cached on disk, with neither checks for division by zero nor fast-math.
 
     ``options`` are passed to Numba's ``njit``, where they may enable either; without a function, a
-    decorator is returned. Numba's wrapper for callers in C is left out, as there are none.
+    decorator is returned. There is no wrapper for callers in C.
     """
     if function is None:
         return lambda wrapped: compiled(wrapped, **options)
@@ -101,7 +101,7 @@ class _InnerCompiler(Compiler):  # type: ignore[misc]
 
 
 def inner(function=None, **options):
-    """Compile ``function``, which only compiled functions call, without a cache of its own.
+    """Compile ``function``, which only compiled functions call, without caching it on disk.
 
     Its arguments may be functions, which Numba identifies by numbers that change with the process.
     """

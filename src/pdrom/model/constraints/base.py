@@ -93,7 +93,7 @@ class ConstraintGroup(Effect):
             inside = np.isin(vertices, select_vertices(mesh, entry.select)).all(axis=1)
             if not inside.any():
                 raise SceneError(
-                    f"factors[{number}]: selects no element, which lies on a {self.cells}"
+                    f"factors[{number}]: no element ({self.cells}) has all vertices in select"
                 )
             weights[inside] *= entry.factor
         return weights
@@ -114,16 +114,16 @@ class ConstraintGroup(Effect):
 
     def _require_frame(self) -> None:
         if self.frame_lagged and not self._of_run:
-            raise RuntimeError(f"{self.name}: a scene's group has no frame; use that of `for_run`")
+            raise RuntimeError(f"{self.name}: a scene's group has no frame; use `for_run`")
 
     def for_run(self) -> Self:
-        """Return the group with memory of its own for all that a run writes, the rest shared."""
+        """Return a copy with separate memory for all that a run writes; it shares the rest."""
         own = copy(self)
         own.local_kernel, own._of_run = own._accumulator(), True
         return own
 
     def _accumulator(self) -> LocalKernel | None:
-        """Return a new `local_kernel` with its own memory; None if `accumulate` is overridden."""
+        """Return a new `local_kernel` with separate memory; None if `accumulate` is overridden."""
         return None
 
     def kernel_parameters(self) -> np.ndarray:
@@ -154,7 +154,7 @@ class ConstraintGroup(Effect):
         self._require_frame()
         own = self.local_kernel or self.for_run().local_kernel
         if own is None:
-            raise NotImplementedError(f"{self.name} has neither a local kernel nor its own")
+            raise NotImplementedError(f"{self.name} has neither local kernel nor accumulate")
         return own.accumulate(y, rhs)
 
     @abstractmethod
@@ -175,7 +175,7 @@ class ConstraintGroup(Effect):
         return (self.S.T @ self.S.multiply(self.row_weights[:, None])).tocsr()
 
     def roundoff(self, q: np.ndarray) -> float:
-        """Return an estimate of the round-off in S q at ``q`` (N, 3) m: eps || |S| |q| ||_F."""
+        """Estimate the rounding errors in S q at ``q`` (N, 3) m: eps || |S| |q| ||_F."""
         return float(np.finfo(float).eps * np.linalg.norm(abs(self.S) @ np.abs(q)))
 
 
@@ -215,7 +215,7 @@ def require_cells(mesh: Mesh, kind: str, effect: str) -> np.ndarray:
     SceneError if the mesh has none, or if it is a volume mesh and ``kind`` is "triangles"."""
     cells = getattr(mesh, kind)
     if kind == "triangles" and len(mesh.tetrahedra):
-        raise SceneError(f"effect '{effect}' needs a surface mesh, this mesh is a volume")
+        raise SceneError(f"effect '{effect}' needs a surface mesh, this mesh has tetrahedra")
     if len(cells) == 0:
         way = "" if kind == "triangles" else "; fTetWild or gmsh make them from a closed surface"
         raise SceneError(f"effect '{effect}' needs {kind}, this mesh has none{way}")

@@ -18,7 +18,7 @@ from pdrom.model.constraints.local_kernel import OWN, VERTICES, LocalKernel
 from pdrom.model.constraints.simplex import copy_rows, store_projections
 from pdrom.model.mesh.types import Mesh, barycentric_areas, boundary_edges
 
-# Length below which a unit vector's component orthogonal to the vertex normal is only round-off.
+# Below this length a unit vector's component orthogonal to the vertex normal is a rounding error.
 RIM = 1e-15
 # A unit vector's component in the plane of a half sphere's rim, if longer than this, is orthogonal
 # to the vertex normal up to 2e-12. A shorter one has lost digits and is made orthogonal once more.
@@ -47,7 +47,7 @@ def put_poles(manifold, elements, side, normals):
 
 @lanes.lane_function
 def _curvature(y, e, start, indices, data):
-    """Mean-curvature vector of element e at the positions y, from the operator S in CSR form."""
+    """Return the mean-curvature vector of element e at the positions y; the operator S is CSR."""
     h = arithmetic.constant(0.0)
     for k in range(at(start, e), at(start, e + 1)):
         h = arithmetic.add_scaled(h, at(data, k), rows.load(y, WIDTH * at(indices, k)))
@@ -98,7 +98,7 @@ def _to_rims(work, manifold, first):
         height = work[HEIGHT * lanes.LANES + lane]
         rim, length = _without(unit, height, n)
         again, left = _without(rim, lanes.dot(rim, n), n)
-        # if ``unit`` is along n, ``rim`` is only round-off: take any direction orthogonal to n
+        # if ``unit`` is along n, ``rim`` is a rounding error: take any direction orthogonal to n
         again = lanes.choose(length > RIM and left > 0.5, again, lanes.perpendicular(n))
         rim = lanes.choose(length > NEAR_POLE, rim, again)
         lanes.save(work, P, lane, lanes.choose(height < 0.0, rim, unit))
@@ -184,7 +184,7 @@ def accumulate_vertices(y_place, rhs_place, record):
 def project_gradients(d_place, manifold_place, p_place, m):
     """Project the curvature vectors S q (m, 3) onto half spheres (`VertexBending`): write p (m, 3).
 
-    The first three arguments are addresses of S q, to the numbers from `lanes.pack`, and to p.
+    The first three arguments are addresses of S q, of the numbers from `lanes.pack`, and of p.
     """
     d, p = rows.doubles(d_place, 3 * m), rows.doubles(p_place, 3 * m)
     blocks = (m + lanes.LANES - 1) // lanes.LANES
@@ -285,8 +285,8 @@ class VertexBending(ConstraintGroup):
     to H on the half sphere { |p| = m, s p.n >= 0 }. The vertex normal n is that at the beginning of
     the frame: the half sphere is fixed during iterations, so that the objective cannot rise. If
     s H.n < 0, p is on the rim of the half sphere and pulls the vertex back, so that it does not
-    flip. A flat rest shape has m = 0 up to round-off and s = 0. If H = 0, p is the pole m s n; if
-    moreover the triangles around the vertex have no area, p is the rest value of H.
+    flip. A flat rest shape has m = 0 up to rounding errors and s = 0. If H = 0, p is the pole
+    m s n; if the triangles around the vertex also have no area, p is the rest value of H.
     """
 
     class Config(GroupConfig):

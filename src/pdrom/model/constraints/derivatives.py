@@ -1,13 +1,13 @@
 """Derivatives dp/dd of projections, with eigenvalues above 1 replaced by 1, for Newton's method.
 
-So the Hessian w (I - dp/dd) of an element's energy 1/2 w |d - p|^2 is positive semi-definite.
+The Hessian w (I - dp/dd) of an element's energy 1/2 w |d - p|^2 is then positive semi-definite.
 
 Let F = d^T have the singular values sigma_i and vectors u_i, v_i, and p the values t_i. dp/dd has
 the eigenvectors (u_i v_j^T -+ u_j v_i^T) / sqrt(2) with eigenvalues (t_i +- t_j) / (sigma_i +-
 sigma_j); on the matrices u_i v_i^T it is J = dt/dsigma: 1 or 0 for values clamped to a range, 0 for
 lengths and directions. For a product in a range (module `products`) t_i (t_i - sigma_i) = m for all
-i, and J = diag(t_i n_i) - n n^T / sum_i n_i / t_i with n_i = t_i / (t_i^2 + m); if m < 0, all its
-eigenvalues but one 0 are above 1: clamped, J is that of m = 0.
+i, and J = diag(t_i n_i) - n n^T / sum_i n_i / t_i with n_i = t_i / (t_i^2 + m). If m < 0, J has one
+eigenvalue 0 and others above 1, so that clamping gives J of m = 0.
 """
 
 import numpy as np

@@ -101,31 +101,31 @@ def unmarked(work, mark):
 
 @lane_function
 def dot(a, b):
-    """Inner product of two vectors ``a`` and ``b`` of three numbers."""
+    """Return the inner product of two vectors ``a`` and ``b`` of three numbers."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @lane_function
 def cross(a, b):
-    """Vector product of ``a`` and ``b``."""
+    """Return the vector product of ``a`` and ``b``."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @lane_function
 def scaled(s, a):
-    """Product s a of a number and a vector."""
+    """Return the product s a of a number and a vector."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @lane_function
 def mix(s, a, t, b):
-    """Linear combination s a + t b of two vectors."""
+    """Return the linear combination s a + t b of two vectors."""
     return (s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2])
 
 
 @lane_function
 def mix3(r, a, s, b, t, c):
-    """Linear combination r a + s b + t c of three vectors."""
+    """Return the linear combination r a + s b + t c of three vectors."""
     return (
         r * a[0] + s * b[0] + t * c[0],
         r * a[1] + s * b[1] + t * c[1],
@@ -135,13 +135,13 @@ def mix3(r, a, s, b, t, c):
 
 @lane_function
 def choose(condition, a, b):
-    """Vector a if the condition holds, else vector b."""
+    """Return vector a if the condition holds, else vector b."""
     return (a[0] if condition else b[0], a[1] if condition else b[1], a[2] if condition else b[2])
 
 
 @lane_function
 def square_distance(a, b):
-    """Squared distance of two points a and b."""
+    """Return the squared distance of two points a and b."""
     return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
 
 
@@ -153,7 +153,7 @@ def absolute_sum(a):
 
 @lane_function
 def clamp(x, low, high):
-    """Number x, limited to the interval [low, high]."""
+    """Return the number x, limited to the interval [low, high]."""
     x = low if x < low else x
     return high if x > high else x
 

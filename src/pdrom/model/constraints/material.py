@@ -1,4 +1,4 @@
-"""Materials in physical units: keys of a group in place of its weight, resolved to weights.
+"""Materials in physical units, from which the weights of constraint groups are computed.
 
 An isotropic elastic material has the energy mu |e|^2 + lambda / 2 (tr e)^2 per volume, with a small
 strain e and Lamé's constants; a sheet in plane stress has it per area, times its thickness. On
@@ -20,7 +20,7 @@ EXACT = {"minimum": 1.0, "maximum": 1.0}
 class Solid(EffectConfig):
     """Young's modulus ``young``, Pa, and Poisson's ratio ``poisson`` of tetrahedra."""
 
-    size: ClassVar[str] = "volume"  # group of the size of elements
+    size: ClassVar[str] = "volume"  # group for the size of elements
     dimension: ClassVar[int] = 3
     allowed: ClassVar[dict[str, Any]] = {}  # range of the group itself
 
@@ -33,12 +33,12 @@ class Solid(EffectConfig):
     def _without_weight(cls, data: dict[Any, Any]) -> dict[Any, Any]:
         for key in ("weight", *EXACT):
             if key in data:
-                fault = "not beside young, poisson or thickness, which set it"
+                fault = "not allowed with young, poisson or thickness, which determine it"
                 raise ValueError(f"{key} = {shown(data[key], 60)}: {fault}")
         return data
 
     def parts(self) -> tuple[EffectConfig, ...]:
-        """Return the group and, unless its weight is 0, the group of the size."""
+        """Return the group and, unless its weight is 0, the group for volume or area."""
         own = self.allowed | {"effect": self.effect, "factors": self.factors}
         own["weight"] = getattr(self, "thickness", 1.0) * self.young / (1.0 + self.poisson)
         ratio = self.dimension * self.poisson / (1.0 - (self.dimension - 1) * self.poisson)

@@ -10,7 +10,7 @@ If the product of the s_i is below c, there is one solution. If it is far above 
 times for three equal values), there are several: that with the largest t shrinks all values, that
 with the smallest t mainly the last one. As f is convex near the largest and concave near the
 smallest t, Newton's iteration converges monotonically to the largest from above and to the smallest
-from below; the nearer to the s_i is the result. Bouaziz et al. 2014, app. A, start from s_i only.
+from below; the result is that nearer to the s_i. Bouaziz et al. 2014, app. A, start from s_i only.
 
 Values are divided by the larger of s_1 and c^(1/3), so that neither huge nor tiny ones overflow.
 """
@@ -104,7 +104,7 @@ def _advance(work, place, side, solid):
 
 @lane_function
 def _distance(t, values, target, solid):
-    """Squared distance of ``values`` s_i from t_1(t), t_2(t), t; inf unless t solves f(t) = 0."""
+    """Return the squared distance of s_i (``values``) from t_1, t_2, t; inf unless f(t) = 0."""
     product, _, first, second = _product(t, values, solid)
     m = t * (t - values[2])
     a, b = m / (first + SMALLEST), m / (second + SMALLEST) if solid else 0.0
@@ -198,7 +198,7 @@ def _nearest_of_several(values: np.ndarray, target: float) -> np.ndarray:
     smallest = min(target / values[:-1].prod(), last)
     grid = np.union1d(np.geomspace(smallest, last, 500), np.linspace(smallest, last, 500))
     same = np.tile(values, (len(grid), 1))
-    # the product at t = grid[0] is not above ``target``, unless by round-off, hence small[0]
+    # the product at t = grid[0] exceeds ``target`` only by rounding errors, hence small[0]
     small = _values_at(grid, same).prod(axis=1) < target
     small[0] = True
     crossed = np.flatnonzero(small[:-1] & ~small[1:])

@@ -4,10 +4,10 @@ An element with p rows has p + 1 vertices, S q = D^-T [q_1 - q_0, ..., q_p - q_0
 matrix D of the rest shape (1 for springs). This module reads positions and adds forces of blocks of
 elements (see `pdrom.model.constraints.lanes`); the groups differ in the projection of a block.
 
-If one element of a block needs a more expensive formula, the whole block computes it. Neighbouring
-elements are in similar states and share vertices in the cache: blocks of neighbours are cheap. As
-mesh files often list neighbours far apart, kernels visit the elements in another order. The public
-arrays of a group (S, weights, projections) keep the order of the mesh.
+If one element of a block needs a slower formula, the whole block computes it. Blocks of neighbours
+are fast, because neighbours are in similar states and share vertices in the cache. Mesh files often
+list neighbours at distant places, so that kernels may visit the elements in another order. The
+public arrays of a group (S, weights, projections) keep the order of the mesh.
 """
 
 from typing import Any, ClassVar

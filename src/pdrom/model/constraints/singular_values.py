@@ -7,8 +7,8 @@ gradients(work, geometry, block) : compute S q from the edges
 nearest(work, low, high) : compute the projections p
 forces(work, geometry, block) : compute the forces S^T W p on the corners, and w |S q - p|^2
 
-The loops over blocks are in this module. Each group has its own kernels, which call the loops with
-its functions: Numba caches such kernels on disk, but no closures or functions that take functions.
+The loops over blocks are in this module. Each group has kernels that call the loops with the
+group's functions, as Numba caches neither closures nor functions that take functions on disk.
 """
 
 from typing import Annotated, Self

@@ -16,11 +16,11 @@ SWEEPS = 12
 ORTHOGONAL = 1e-15
 # a sweep is the last if all its rotations have a tangent below this: columns are then orthogonal
 LAST_TANGENT = 1e-8
-# a second singular value below this fraction of the first is round-off: its vector is replaced
+# a second singular value below this fraction of the first is a rounding error: replace its vector
 RANK = 1e-15
 
 # further offsets in the working array: B = F V / scale, V, scale, DONE (1: B is orthogonal), signed
-# singular values, FOUND (1: a cheaper method has already computed this lane's projection)
+# singular values, FOUND (1: a faster method has already computed this lane's projection)
 B, V, SCALE, DONE, SIGMA, FOUND, SIZE = np.add(simplex.SIZE, [0, 9, 18, 19, 20, 23, 24]).tolist()
 
 
@@ -86,7 +86,7 @@ def orthonormal_pair(b0, b1):
     """
     s0 = np.sqrt(dot(b0, b0))
     u0 = choose(s0 > 0.0, scaled(1.0 / s0, b0), (1.0, 0.0, 0.0))
-    # remove the round-off of b1 along b0, which would change the direction of the shorter column b1
+    # remove from b1 rounding errors along b0, which would change the direction of the shorter b1
     b1 = mix(1.0, b1, -dot(u0, b1), u0)
     s1 = np.sqrt(dot(b1, b1))
     u1 = choose(s1 > RANK * s0, scaled(1.0 / s1, b1), lanes.perpendicular(u0))
@@ -95,11 +95,11 @@ def orthonormal_pair(b0, b1):
 
 @lanes.lane_function
 def rotated_pair(f0, f1, sign):
-    """Singular value decomposition of two columns by one rotation, without forming F^T F.
+    """Decompose two columns into singular values and vectors by one rotation, not forming F^T F.
 
     Return the scale by which columns are divided, cosine and sine of the rotation, whether rotated
-    columns were swapped since the second is longer, and their directions and norms (divided by the
-    scale), longer column first. If they were swapped, the shorter one is multiplied by ``sign``.
+    columns were swapped because the second is longer, and their directions and norms (divided by
+    the scale), longer column first. After a swap the shorter column is multiplied by ``sign``.
     """
     scale = absolute_sum(f0) + absolute_sum(f1) + lanes.SMALLEST
     f0, f1 = scaled(1.0 / scale, f0), scaled(1.0 / scale, f1)

@@ -3,13 +3,12 @@
 A local and a global step define a map G of the positions; at its fixed point the objective of the
 frame is stationary. Anderson acceleration (Peng et al. 2018, section 3) replaces y <- G(y) by the
 affine combination of the last few images G(y) for which the same combination of the residuals
-f = G(y) - y is smallest. An iterate whose objective is larger than that of the last one is rejected
-and replaced by the last image G(y), whose objective cannot be larger. The objective never rises,
-and the fixed point is that of G.
+f = G(y) - y is smallest. An iterate that raises the objective is rejected and replaced by the last
+image G(y), which cannot raise it. The objective never rises, and the fixed point is that of G.
 
 The iteration is a quasi-Newton step with the constant system matrix A as Hessian and converges
-slowly on stiff meshes. L-BFGS started from A (Liu, Bouaziz and Kavan 2017, section 4) reaches the
-same limit in far fewer evaluations.
+slowly on stiff meshes. L-BFGS started from A (Liu, Bouaziz and Kavan 2017, section 4) converges in
+far fewer evaluations.
 """
 
 import numpy as np
@@ -148,7 +147,7 @@ class Anderson:
         self.history = _history(window, 0)
 
     def begin_frame(self, y: np.ndarray) -> None:
-        """Delete the iterates of the last frame; ``y`` (n, 3) is the first iterate of a new one."""
+        """Delete the iterates of the last frame; ``y`` (n, 3) is the first of a new frame."""
         n = _numbers(y).size
         if n != len(self.history[0]):
             self.history = _history(self._window, n)
@@ -156,7 +155,7 @@ class Anderson:
 
     def refuse(self, y: np.ndarray, objective: float) -> bool:
         """Return whether iterate ``y`` is rejected: its ``objective``, J, has risen (nan: not).
-        It is then overwritten by G (see top) of the last accepted iterate, the history deleted."""
+        Then ``y`` becomes G (see top) of the last accepted iterate, and the history is deleted."""
         return refuse(self.history, _numbers(y), objective)
 
     def combine(self, image: np.ndarray) -> None:
@@ -180,7 +179,7 @@ def minimise(
 
     The search begins at ``start`` (n, 3) m. It ends when one more local/global iteration would
     change no coordinate by more than ``tolerance``, m, or after ``limit`` evaluations. Return the
-    last iterate (n, 3) m, that largest change, m, and the number of evaluations.
+    last iterate (n, 3) m, the largest change by another iteration, m, and the evaluations.
     """
     n, metric = len(start), (matrix.indptr, matrix.indices, matrix.data)
     y, d, *others = np.empty((5, 3 * n))
@@ -207,7 +206,7 @@ def _pad(vector, padded):
 def _evaluate(y, image, frame):
     """Write the result G(y) of a local and a global step to ``image``; return the objective at y.
 
-    Its gradient is A (y - G(y)); G(y) equals y at fixed vertices. Sums have the order of NumPy's.
+    Its gradient is A (y - G(y)); G(y) equals y at fixed vertices. Sums are in the order of NumPy.
     """
     s, base, inertia, (addresses, records), factor, padded, rhs, added, squares = frame
     panels, vertices, loads, work = factor
@@ -266,7 +265,7 @@ def _find_direction(pairs, d, direction, memory):
 def _descend(objective, pairs, vectors, metric, frame):
     """Do a step of L-BFGS with backtracking; return objective, numbers of evaluations and pairs.
 
-    A pair is a step s; its change c of A^-1 times the gradient; A s; A c; s^T A c.
+    A pair consists of a step s; its change c of A^-1 times the gradient; A s; A c; s^T A c.
     """
     y, d, direction, trial, image, steps, changes, a_steps, a_changes, numbers = vectors
     padded = frame[5]

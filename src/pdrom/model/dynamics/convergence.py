@@ -3,7 +3,7 @@
 A local and a global step map an iterate y to G(y); the converged frame is the fixed point y + d.
 With r = G(y) - y and the derivative G' at y, (I - G') d = r to first order. The estimate is |d| of
 the Galerkin solution in the Krylov space of r (Saad 1981), with differences of G. The error is |d|
-over the motion |y - q|, at least `REST` times the extent, in mass-weighted root mean squares.
+over the displacement |y - q|, at least `REST` times the extent, in mass-weighted root mean squares.
 """
 
 from contextlib import suppress
@@ -20,8 +20,8 @@ from pdrom.model.compiled.rows import WIDTH, flat
 from pdrom.model.dynamics.stepper import Observer, State, Stepper
 
 DIRECTIONS, EVERY, BEGIN = 10, 20, 10  # of the Krylov space; frames 10, 30, 50, ... are estimated
-STEP = 1e-7  # length of the differences of G over the extent: round-off and curvature stay small
-REST = 1e-6  # least motion that counts, over the extent: the scale of a body at rest
+STEP = 1e-7  # length of differences of G, over the extent: rounding errors and curvature stay small
+REST = 1e-6  # least displacement in the denominator, over the extent, for bodies at rest
 
 
 class Until(ConfigModel):
@@ -43,7 +43,7 @@ Iterations = Annotated[Annotated[int, Field(ge=1, le=10_000)] | Until, BeforeVal
 
 @compiled(nogil=True)
 def add_direction(basis, slopes, j, image, reached, own, ahead):
-    """Add row j + 1 to ``basis``, column j to ``slopes``; move ``image`` from G along that row."""
+    """Orthonormalise the change of ``image`` to row j + 1 of ``basis``; step ``image`` along it."""
     new = basis[j + 1]
     for i in range(len(new)):
         new[i] = (image[i] - reached[i]) / ahead[i]
@@ -59,16 +59,16 @@ def add_direction(basis, slopes, j, image, reached, own, ahead):
 
 
 def frame_error(y: Any, converged: Any, before: Any, masses: np.ndarray, extent: float) -> float:
-    """Error of a frame, from ``before`` to ``y``; (N, 3) and ``extent`` m, ``masses`` (N,) kg."""
+    """Return the error of a frame from ``before`` to ``y``, (N, 3) m, as defined in the module."""
     root = np.sqrt(masses / masses.sum())[:, None]
     far, moved = (float(np.linalg.norm(root * (y - other))) for other in (converged, before))
     return far / max(moved, REST * extent)
 
 
 class EstimatingStepper(Stepper):
-    """Full-order step loop that estimates the error of every 20th frame; nothing else changes.
+    """Full-order step loop that estimates the error of every 20th frame; results do not change.
 
-    With ``until``, a frame has 10, 20, 40, ... or all iterations, until its estimate suffices.
+    With ``until``, a frame has 10, 20, 40, ... or all iterations, until its error is small enough.
     ``extent`` (m) is the mesh's longest side; other arguments are those of `Stepper`. ``errors``
     maps frames to errors; ``worst`` is the largest, its frame and the state before it.
     """
@@ -88,7 +88,7 @@ class EstimatingStepper(Stepper):
         if not self._due:
             return super().step(state, frame, on_last_iterate)
         self._start = flat(state.positions)
-        after = super().step(state, frame, on_last_iterate or (lambda y: None))  # not as one call
+        after = super().step(state, frame, on_last_iterate or (lambda y: None))  # iterates here
         if self._found > (self.worst[0] if self.worst else -1.0):
             self.worst = self._found, frame, state
         self.errors[frame] = self._found
@@ -122,7 +122,7 @@ class EstimatingStepper(Stepper):
             self._in_python(k, (s, base, y), system, np.empty(which.stop), seconds)
 
     def _error(self, y: np.ndarray, *frame: Any) -> float:
-        """Estimated error of a ``frame`` (s, base, system) with the last iterate ``y``."""
+        """Return the estimated error of a ``frame`` (s, base, system) with last iterate ``y``."""
         own, trial, count = flat(y), self.space.copy(y), self._directions
         image, ahead = flat(trial), STEP * self._extent / self._scale
         basis, slopes = self._basis, np.zeros((count + 1, count))

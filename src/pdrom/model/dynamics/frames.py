@@ -168,7 +168,7 @@ def all_iterations(
     return 0.0
 
 
-# Largest number of frames that one compiled call computes: few are wasted if a run ends early.
+# Largest number of frames per compiled call; small, so that few are wasted if a run ends early.
 BLOCK = 16
 
 Blocks = tuple[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray], Anchors]
@@ -237,7 +237,7 @@ class WholeFrames:
         h : time step, s
         iterations : number of iterations per frame
         track : whether the objective is computed
-        anchors : those of the state at the beginning
+        anchors : anchors of the state at the beginning
         """
         fixed, targets, anchors = self._space.held_path(frames[:BLOCK], q, anchors)
         system = self._space.elimination(fixed)

@@ -1,10 +1,10 @@
 """Factorisations of the global system: factor once, solve often.
 
 Panels (supernodes) are consecutive columns of a factor that substitution ("sweep") treats together.
-A panel stores, of the rows below its columns, those in which any of its columns has an entry, with
-explicit zeros for its columns that have none. With wider panels, substitution reads the right-hand
-side less often and waits less often for a preceding column, but more zeros are stored. Dynamic
-programming finds the partition of the columns with the fewest estimated processor cycles.
+Of the rows below its columns, a panel stores those in which at least one column has an entry, with
+zeros for its other columns. With wider panels, substitution reads the right-hand side less often
+and waits less often for a preceding column, but more zeros are stored. Dynamic programming finds
+the partition of the columns with the fewest estimated processor cycles.
 """
 
 from typing import Any
@@ -19,8 +19,8 @@ from pdrom.model.compiled.functions import compiled
 from pdrom.model.compiled.rows import WIDTH
 from pdrom.model.dynamics.sweeps import SWEEP, WIDTHS, load, sweep
 
-# Estimated processor cycles of the substitution: for a panel of columns of L (mispredicted branch,
-# columns wait for each other), a row below it, a row's entry; fitted to 400 to 10,000 vertices.
+# Estimated processor cycles of the substitution for each panel (mispredicted branch, waiting for
+# columns), each row below it and each entry of this row; fitted to 400 to 10,000 vertices.
 PANEL, ROW, ENTRY = 20.0, 1.0, 0.5
 
 
@@ -38,7 +38,7 @@ def panels(lower: sparse.csc_array, diagonal: np.ndarray) -> tuple[Any, ...]:
     row_start, value_start : (P + 1,) first index of each panel in ``rows`` and in ``values``
     rows : indices of the rows below each panel, times `pdrom.model.compiled.rows.WIDTH`
     values : for each panel of w columns with m rows below: 1 / D (w,), the strict lower triangle of
-        L in the panel's own w rows, row by row, then the part of L in the m rows below, (m, w)
+        L in the w rows of the panel, row by row, then the part of L in the m rows below, (m, w)
     """
     n = lower.shape[0]
     below = np.zeros((max(WIDTHS) + 1, n), np.int64)
@@ -68,7 +68,7 @@ def _count_rows_below(indptr, indices, seen, below):
     """Write to below[w, j] how many rows below row j have an entry in columns j - w + 1 to j.
 
     ``seen`` (n,) is working memory, filled with -1. Python allocates all arrays, because an
-    allocation in compiled code takes a tenth of a second to compile.
+    allocation in compiled code takes 0.1 s to compile.
     """
     for j in range(len(seen)):
         count = 0
@@ -109,7 +109,7 @@ def _fill(indptr, indices, data, inverse, first, row_start, value_start, rows, v
             row = indices[k]
             if row >= b and place[row] < 0:
                 place[row] = 0
-                # insertion sort: row indices come nearly sorted; NumPy's sort compiles for a second
+                # insertion sort: indices are nearly sorted; NumPy's sort takes a second to compile
                 new = start + count
                 while new > start and rows[new - 1] > row:
                     rows[new] = rows[new - 1]
@@ -201,7 +201,7 @@ class SupernodalSolver(SuperLUSolver):
             own = sparse.csr_array(self._held[unknowns])
             # rows of the few unknowns that are coupled to held vertices
             beside = np.flatnonzero(np.diff(own.indptr))
-            index = (each.astype(np.int32) for each in (own.indptr, own.indices))  # of one type
+            index = (each.astype(np.int32) for each in (own.indptr, own.indices))  # one type
             self.coupling = beside, *index, own.data
 
     def set_targets(self, targets: np.ndarray) -> None:

@@ -65,8 +65,8 @@ class Space(ABC):
     def fixed(self, frame: int, positions: np.ndarray, anchors: base.Anchors = ()) -> base.Held:
         """Return indices (m,), ascending, and values (m, 3) of coordinates prescribed in ``frame``.
 
-        ``positions`` (n, 3) are the coordinates at the beginning of the frame, ``anchors`` those of
-        the state; anchors of the state after the frame are the third result.
+        ``positions`` (n, 3) are the coordinates at the beginning of the frame, ``anchors`` belong
+        to this state; the third result are the anchors of the state after the frame.
         """
         one = range(frame, frame + 1)
         indices, path, anchors = base.held_path(self.boundaries, one, positions, anchors)

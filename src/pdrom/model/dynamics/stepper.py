@@ -31,7 +31,7 @@ class LocalStep(Protocol):
 
     In a position subspace y and rhs have the shape (k, 3) of k coordinates instead of (N, 3).
     Compiled iterations need an attribute ``local_kernel`` in every local step. A local step that
-    several runs may share has a method ``for_run``, which returns it with memory of its own.
+    several runs may share has a method ``for_run``, which returns a copy with separate memory.
     """
 
     name: str
@@ -50,7 +50,7 @@ class LocalStep(Protocol):
 class State:
     """Positions (N, 3) m and velocities (N, 3) m/s, or their coordinates (k, 3) in a subspace.
 
-    With ``anchors``, where present holds began, any step loop of the scene can continue from here.
+    ``anchors`` are positions where holds began; any step loop of the scene needs them to continue.
     """
 
     positions: np.ndarray
@@ -96,7 +96,7 @@ class Stepper:
         self._compiled, self._whole = space.compiled(self.local_steps, acceleration)
 
     def local_step(self, name: str) -> Any:
-        """Return the local step ``name`` of this loop, with the data of its present frame."""
+        """Return the local step ``name`` of this loop, with the data of the present frame."""
         return next(step for step in self.local_steps if step.name == name)
 
     def step(
@@ -119,7 +119,7 @@ class Stepper:
     def run(self, state: State, frames: range) -> Iterator[tuple[State, FrameReport]]:
         """Yield the state and report after each of ``frames``, several of them per compiled call.
 
-        Later frames may have been computed already when the caller changes, say, an effect.
+        Changes by the caller, for example of an effect, do not affect frames already computed.
         """
         while frames:
             # if a subclass overrides `step`, it is called for every frame
@@ -164,8 +164,8 @@ class Stepper:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compute all iterations of a frame; return the last iterate and the objective (K,), J.
 
-        They begin with the prediction ``s``. Times of local and global steps are added to
-        ``seconds``; ``watch`` is called with the iterate with which the last iteration begins.
+        Iterations begin with the prediction ``s``. Times of local and global steps are added to
+        ``seconds``; ``watch`` is called with the iterate before the last iteration.
         """
         y = self.space.copy(s)
         objective = np.full(self.iterations if self._track else 0, np.nan)

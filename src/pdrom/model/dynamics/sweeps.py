@@ -66,13 +66,13 @@ class _Panel:
         self.builder.store(row, pointer, align=8)
 
     def less(self, a, entry, b):
-        """Return a - entry * b for registers of four numbers, each number for itself."""
+        """Return a - entry * b for registers of four numbers, number by number."""
         return multiply_add(self.builder, self.builder.fneg(entry), b, a)
 
     def rows_below(self):
         """Generate a loop over the rows of factor L below the panel's triangle; callers add a body.
 
-        Yield the address of that row of the right-hand side and a function: panel column -> entry.
+        Yield the address of each row of the right-hand side and a function: panel column -> entry.
         """
         builder = self.builder
         with cgutils.for_range_slice(builder, self._start, self._stop, self._index(1)) as (k, _):
@@ -170,7 +170,7 @@ def load(beside, indptr, indices, data, targets, loads):
 def _sweep(
     count, first, row_start, value_start, rows, values, size, vertices, loads, x, rhs, y
 ):  # fmt: skip
-    """Compute `sweep` for ``size`` unknowns in ``count`` panels of L; the rest are addresses."""
+    """Compute `sweep` for ``size`` unknowns in ``count`` panels of L; the others are addresses."""
     first, vertices = integers(first, count + 1), integers(vertices, size)
     row_start, value_start = indices(row_start, count + 1), indices(value_start, count + 1)
     rows, values = integers(rows, row_start[count]), doubles(values, value_start[count])

@@ -39,7 +39,7 @@ class Elimination:
             require_accurate(block, self._solve_free)
 
     def for_run(self) -> "Elimination":
-        """Return the system with memory of its own for targets and solves, the factor shared."""
+        """Return a copy with separate memory for targets and solves; it shares the factor."""
         own, own._solver = copy(self), copy(self._solver)
         if own._solver is not None and own.factor is not None:
             panels, order, loads, x = own.factor
@@ -78,8 +78,8 @@ def require_accurate(matrix, solve: Callable[[np.ndarray, np.ndarray], object]) 
     error = float(np.abs(found - known).max())
     if not error <= ACCURACY:
         raise SolverError(
-            f"global system of size {len(known)}: a solve is wrong by {error:.1e}, allowed is "
-            f"{ACCURACY:g}: masses over the squared time step are round-off beside the weights"
+            f"global system of size {len(known)}: a solve has the error {error:.1e} (allowed "
+            f"{ACCURACY:g}): masses / time_step^2 are too small for the weights; reduce weights"
         )
 
 

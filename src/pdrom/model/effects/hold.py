@@ -72,7 +72,7 @@ class HandleConfig(HoldConfig):
     over: Annotated[FrameNumber, Field(ge=1)]
 
     def progress(self, frame: int) -> float:
-        """Return the fraction of the motion, 0 to 1, completed at the end of ``frame``."""
+        """Return the fraction of the path, 0 to 1, completed at the end of ``frame``."""
         return min(1.0, (frame + 1 - self.start) / self.over)
 
 

@@ -58,7 +58,7 @@ class Obstacle(Contact):
             positions[inside] = lifted - along + self._braked(along, depth)
 
     def _braked(self, along: np.ndarray, depth: np.ndarray) -> np.ndarray:
-        """Return ``along`` (n, 3) m, tangential motion, shortened by mu times ``depth`` (n,) m."""
+        """Return ``along`` (n, 3) m, tangential displacements, shortened by mu ``depth`` (n,) m."""
         mu = self.config.friction
         if mu == 0.0:
             return along

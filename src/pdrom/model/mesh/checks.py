@@ -31,7 +31,7 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
     cells = mesh.tetrahedra if len(mesh.tetrahedra) else mesh.triangles
     kind = "tetrahedron" if len(mesh.tetrahedra) else "triangle"
     if len(cells) == 0:
-        raise MeshError(f"{name}: no triangles and no tetrahedra")
+        raise MeshError(f"{name}: neither triangles nor tetrahedra")
     require_finite(f"{name}: points", mesh.points, MeshError)
     check_indices(cells, mesh.vertices, kind, name=name)
     _check_neighbours(cells, kind, name)
@@ -43,7 +43,7 @@ def check_mesh(mesh: Mesh, name: str) -> Mesh:
 def mesh_of(points: np.ndarray, cells: np.ndarray, name: str) -> Mesh:
     """Return a mesh of ``points`` (N, 3) m, ``cells`` (n, 3 or 4); tetrahedra get volumes > 0.
 
-    MeshError, which ``name`` begins, if an index is out of range or repeated in a cell.
+    MeshError, beginning with ``name``, if an index is out of range or repeated in a cell.
     """
     if cells.shape[1] == 3:
         check_indices(cells, len(points), "triangle", name=name)
@@ -77,7 +77,7 @@ def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> Non
 def check_range(points: np.ndarray, scale: float, name: str) -> None:
     """Raise MeshError if a coordinate exceeds `MAX_LENGTH` or the longest side is < `MIN_LENGTH`.
 
-    Squares of such lengths would overflow or lose all digits.
+    Squares of larger or smaller lengths would overflow or lose all digits.
 
     points : (N, 3), in metres after the multiplication by ``scale``
     name : name of the mesh, for messages
@@ -92,8 +92,8 @@ def check_range(points: np.ndarray, scale: float, name: str) -> None:
     extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     if extent < MIN_LENGTH / scale:
         raise MeshError(
-            f"{name}: extent {extent:g}, allowed is at least {MIN_LENGTH / scale:g} (the longest "
-            "side of the bounding box)"
+            f"{name}: extent {extent:g} (longest side of the bounding box), allowed is at least "
+            f"{MIN_LENGTH / scale:g}"
         )
 
 
@@ -135,7 +135,7 @@ def _check_vertices(mesh: Mesh, cells: np.ndarray, name: str) -> None:
         unused = np.flatnonzero(~used)
         raise MeshError(
             f"{name}: vertices in no element: {len(unused)}, the first is {unused[0]}; "
-            f"`merge: {SEAM:.1e}` below `mesh` leaves out those of a file"
+            f"for a mesh file, `merge: {SEAM:.1e}` below `mesh` leaves them out"
         )
     _, first, inverse = np.unique(mesh.points, axis=0, return_index=True, return_inverse=True)
     original = first[inverse.ravel()]
@@ -143,7 +143,7 @@ def _check_vertices(mesh: Mesh, cells: np.ndarray, name: str) -> None:
         repeated = np.flatnonzero(original != np.arange(mesh.vertices))[0]
         raise MeshError(
             f"{name}: vertex {repeated} repeats the position of vertex {original[repeated]}; "
-            f"`merge: {SEAM:.1e}` below `mesh` merges vertices of a file"
+            f"for a mesh file, `merge: {SEAM:.1e}` below `mesh` merges them"
         )
 
 
@@ -151,8 +151,8 @@ def _check_measures(mesh: Mesh, cells: np.ndarray, kind: str, name: str) -> None
     corner = mesh.points[cells]
     edges = corner[:, 1:] - corner[:, :1]
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
-    # scale the longest edge to one; the Gram determinant is not used: as the square of area or
-    # volume, it would consist of round-off where these are below 1e-8
+    # scale the longest edge to one; the Gram determinant, the square of area or volume, would
+    # consist of rounding errors where these are below 1e-8
     edges = edges / longest[:, None, None]
     normal = np.cross(edges[:, 0], edges[:, 1])
     if kind == "triangle":
@@ -176,15 +176,15 @@ def seams(mesh: Mesh) -> str:
     pairs = (tree.count_neighbors(tree, SEAM * mesh.extent) - mesh.vertices) // 2
     text = f"{parts} connected part{'s' * (parts > 1)}"
     if pairs:
-        text += f", {pairs} pairs of vertices closer than {SEAM:g} of its extent"
+        text += f", {pairs} pairs of vertices closer than {SEAM:g} of the extent"
     return text
 
 
 def merged(mesh: Mesh, tolerance: float, name: str) -> Mesh:
     """Return ``mesh`` with vertices that are closer than ``tolerance`` m merged into the first.
 
-    Elements of which two vertices become one, and vertices in no element, are left out. ``name``
-    begins messages.
+    Elements in which two vertices become one, and vertices in no element, are left out. Messages
+    begin with ``name``.
     """
     pairs = cKDTree(mesh.points).query_pairs(tolerance, output_type="ndarray")
     graph = sparse.coo_array((np.ones(len(pairs)), pairs.T), shape=2 * (mesh.vertices,))
@@ -196,7 +196,7 @@ def merged(mesh: Mesh, tolerance: float, name: str) -> Mesh:
     whole = (np.diff(np.sort(cells, axis=1), axis=1) > 0).all(axis=1)
     used, corners = np.unique(cells[whole], return_inverse=True)
     log.warning(
-        "%s: %d vertices are merged into %d; %d elements become flat and are left out, and %d "
+        "%s: %d vertices are merged into %d; left out are %d elements that become flat and %d "
         "vertices in no element",
         name, mesh.vertices, count, len(cells) - whole.sum(), count - len(used),
     )  # fmt: skip
@@ -210,7 +210,7 @@ def turned_alike(mesh: Mesh, name: str) -> tuple[Mesh, np.ndarray]:
     nodes per triangle (as given, reversed), joined to the nodes of neighbours with consistent
     orientation. A part is orientable if its nodes form two connected components.
 
-    Raises MeshError, beginning with ``name``, if a part is not orientable, as a Möbius strip.
+    Raises MeshError, beginning with ``name``, if a part is not orientable (a Möbius strip).
     """
     triangles, t = mesh.triangles, len(mesh.triangles)
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
@@ -228,8 +228,8 @@ def turned_alike(mesh: Mesh, name: str) -> tuple[Mesh, np.ndarray]:
     if (labels[0] == labels[1]).any():
         first = np.flatnonzero(labels[0] == labels[1])[0]
         raise MeshError(
-            f"{name}: the surface about triangle {first} {triangles[first].tolist()} has one side "
-            "only, so that its triangles cannot be turned the same way"
+            f"{name}: the surface around triangle {first} {triangles[first].tolist()} has one side "
+            "only, so that its triangles cannot be oriented consistently"
         )
     part, side = np.min(labels, axis=0), labels[0] > labels[1]
     count = np.bincount(part, side, minlength=2 * t)

@@ -65,7 +65,7 @@ class GeneratedMesh(MeshModel, ABC):
 
     @property
     def axes(self) -> list[int]:
-        """Axes along which the sides of the grid lie (0: x), in no order."""
+        """Axes along which the sides of the grid lie (0: x), in any order."""
         return [0, 1, 2]
 
     @abstractmethod
@@ -152,8 +152,8 @@ class MeshFile(MeshModel):
     """A mesh file in the scene file's folder or below; formats with several files are excluded.
 
     path : path of the mesh file, relative to the folder of the scene file
-    merge : vertices that are closer than this fraction of the extent become one; with
-        it, those in no element are left out
+    merge : vertices that are closer than this fraction of the extent become one; if it is set,
+        vertices in no element are left out
     """
 
     kind: Literal["file"]
@@ -200,8 +200,8 @@ class MeshFile(MeshModel):
         alike, turned = checks.turned_alike(scaled, self.path)
         if len(turned):
             log.warning(
-                "%s: %d of %d triangles are listed the other way round than their neighbours, the "
-                "first is %d: they are turned over",
+                "%s: %d of %d triangles have the opposite orientation of their neighbours, the "
+                "first is %d: they are reversed",
                 self.path, len(turned), len(alike.triangles), turned[0],
             )  # fmt: skip
         return alike
@@ -216,7 +216,7 @@ class MeshFile(MeshModel):
         try:
             inside = path.resolve().is_relative_to(root.resolve())
         except (OSError, RuntimeError) as error:  # raised for a cycle of symbolic links
-            raise MeshError(f"mesh.path = '{self.path}': leads nowhere") from error
+            raise MeshError(f"mesh.path = '{self.path}': leads to no file") from error
         if not inside:
             raise MeshError(f"mesh.path = '{self.path}': a link that leads out of {root.resolve()}")
         return path
@@ -246,7 +246,7 @@ class GivenMesh(MeshModel):
 
     def build(self, root: Path) -> Mesh:
         """Raise MeshError: the configuration has a digest of the mesh's arrays, not the arrays."""
-        raise MeshError("mesh.kind = 'given': its arrays come from Python (pdrom.api.build_scene)")
+        raise MeshError("mesh.kind = 'given': pass its arrays from Python (pdrom.api.build_scene)")
 
     @property
     def label(self) -> str:

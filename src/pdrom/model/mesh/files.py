@@ -36,7 +36,7 @@ class MeshLimits:
 
     seconds : processor time of the process that reads the file
     deadline : elapsed seconds after which this process is ended, if it waits or the platform has no
-        limits of processor time; so many that the result does not depend on the machine's load
+        limits of processor time; long enough that the machine's load does not change the result
     memory : bytes of address space of this process
     """
 
@@ -87,7 +87,7 @@ def read_mesh_file(path: Path) -> Mesh:
             raise MeshError(f"{path}: no such mesh file (looked in {path.parent.resolve()})")
         if path.suffix.lower() not in reader.READERS:
             raise MeshError(
-                f"{path}: of another format than {', '.join(reader.READERS)}; "
+                f"{path}: the format is none of {', '.join(reader.READERS)}; "
                 f"try `meshio convert {path.name} {path.stem}.vtu`"
             )
         limits = mesh_limits()
@@ -107,7 +107,7 @@ def read_mesh_file(path: Path) -> Mesh:
 def _arrays(path: Path, digest: str, limits: MeshLimits) -> tuple[np.ndarray, np.ndarray, str]:
     """Return points, cells, remark of a file; cached, with ``digest`` and ``limits`` in the key."""
     numbers = (limits.seconds, limits.memory, limits.vertices, limits.cells)
-    # -P: no module in the working folder shadows one; texts as this process imports them
+    # -P: modules in the working folder shadow none of these; texts as this process imports them
     texts = {name: (get_data(__package__, f"{name}.py") or b"").decode() for name in MODULES}
     command = [sys.executable, "-P", "-X", "utf8", "-W", "ignore", "-c", START, json.dumps(texts)]
     command += [str(path), *map(str, numbers)]
@@ -139,9 +139,9 @@ def _fault(ended: subprocess.CompletedProcess[bytes], limits: MeshLimits) -> str
         return f"not a readable mesh in {limits.memory / 1e9:g} GB of memory; {ADVICE}"
     if status == -getattr(signal, "SIGXCPU", 0):
         time = f"{limits.seconds} s of processor time"
-        return f"not a readable mesh in {time}: cut off, or very large; {ADVICE}"
+        return f"not a readable mesh in {time}: truncated, or very large; {ADVICE}"
     if status < 0:
         return f"the reader was ended by signal {-status} ({signal.strsignal(-status)})"
     lines = ended.stderr.decode(errors="replace").split("\n")
-    last = next((line for line in reversed(lines) if line.strip()), "without a word")
+    last = next((line for line in reversed(lines) if line.strip()), "no error message")
     return f"the reader failed with status {status}: {last[:200]}"

@@ -45,8 +45,8 @@ def cloth(
     return Mesh(points, pairs.reshape(-1, 3).astype(np.int32))
 
 
-# Five tetrahedra, inner one first, of a cell (i, j, k) with even i + j + k; _ODD: with odd. Corner
-# 4 di + 2 dj + dk of the cell is the vertex (i + di, j + dj, k + dk).
+# Five tetrahedra of a cell (i, j, k), the inner one first, if i + j + k is even; _ODD: if odd.
+# Corner 4 di + 2 dj + dk of the cell is the vertex (i + di, j + dj, k + dk).
 _EVEN = ((0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5))
 _ODD = ((1, 2, 4, 7), (0, 1, 2, 4), (3, 1, 7, 2), (5, 1, 4, 7), (6, 2, 7, 4))
 

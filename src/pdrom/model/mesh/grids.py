@@ -16,7 +16,7 @@ import numpy as np
 
 from pdrom.model.mesh import raw
 
-HIGHER = "elements of higher order; read are linear ones, which Gmsh writes with `-order 1`"
+HIGHER = "elements of higher order; only linear ones are read: Gmsh writes them with `-order 1`"
 _LINEAR = {1: (raw.LINE, 2), 2: (raw.TRIANGLE, 3), 3: (raw.QUAD, 4), 4: (raw.TETRA, 4)}
 _LINEAR |= {5: (12, 8), 6: (13, 6), 7: (14, 5), 15: (raw.VERTEX, 1)}
 
@@ -33,13 +33,13 @@ def gmsh(content: bytes) -> raw.Found:
     head = re.search(rb"\$MeshFormat\s+([24]\.?\d*)\s+([01])\s+([48])" + raw.END, content)
     if head is None:
         raise raw.UnreadableError(
-            f"{raw.begin(content)}; Gmsh's formats 2 and 4 are read, `meshio convert` may read it"
+            f"{raw.begin(content)}; only Gmsh's formats 2 and 4 are read, try `meshio convert`"
         )
     order = ("<" if content[head.end()] == 1 else ">") if head[2] == b"1" else ""
     starts = list(re.finditer(rb"^\$(?:Nodes|Elements)" + raw.END, content, re.M))
     raw.require_once([start[0].strip() for start in starts])
     if len(starts) < 2:
-        raise raw.CutError("$Nodes or $Elements is missing, or nodes are parametric ones")
+        raise raw.CutError("$Nodes or $Elements is missing, or nodes are parametric")
     starts.sort(key=lambda start: start[0], reverse=True)
     nodes, elements = (raw.Source(content, order, start.end()) for start in starts)
     if head[1].startswith(b"2"):
@@ -55,7 +55,7 @@ def gmsh(content: bytes) -> raw.Found:
     listed = numbered[places]
     at = np.minimum(np.searchsorted(listed, read.corners), len(points))
     if (listed[at] != read.corners).any() or (listed[1:] == listed[:-1]).any():
-        raise raw.UnreadableError("elements with unknown nodes, or nodes that stand there twice")
+        raise raw.UnreadableError("elements with unknown nodes, or nodes that are listed twice")
     return read._replace(corners=places[at])
 
 
@@ -77,7 +77,7 @@ def _elements(source: raw.Source) -> Iterator[tuple[int, np.ndarray]]:
 def _blocks(
     nodes: raw.Source, elements: raw.Source, old: bool, size: str
 ) -> tuple[np.ndarray, np.ndarray, list[tuple[int, np.ndarray]]]:
-    """Return numbers, positions of nodes, and elements of format 4.1 or 4.0, counts of a type."""
+    """Return node numbers and positions, and elements (format 4.0 if ``old``, else 4.1)."""
     tag = ("i4" if old else size, 1)
     tags, points, cells = list[np.ndarray](), list[np.ndarray](), list[tuple[int, np.ndarray]]()
     for source in (nodes, elements):
@@ -112,7 +112,7 @@ def medit(content: bytes) -> raw.Found:
     if not re.match(rb"\s*MeshVersionFormatted\b", text):
         raise raw.UnreadableError(
             f"{raw.begin(content)}: not Medit's .mesh as text but another program's; save "
-            "it as .vtu or .msh"
+            "the mesh as .vtu or .msh"
         )
     parts = re.split(rb"^[ \t]*([A-Za-z]\w*)", text, flags=re.M)
     names = [name.capitalize() for name in parts[1::2]]
@@ -143,7 +143,7 @@ def vtk(content: bytes) -> raw.Found:
     """Read VTK's legacy .vtk, versions 1 to 5: unstructured grids and polygonal data."""
     head = _VTK.match(content)
     if head is None or not head[1].lower().startswith(b"# vtk datafile version"):
-        raise raw.UnreadableError(f"{raw.begin(content)}, which is no head of VTK's legacy format")
+        raise raw.UnreadableError(f"{raw.begin(content)}, no header of VTK's legacy format")
     source = raw.Source(content, ">" if head[3].upper() == b"BINARY" else "", head.end())
     points, kinds, cells, names = None, None, list[raw.Found](), list[bytes]()
     while words := source.line().decode(errors="replace").split():
@@ -164,8 +164,8 @@ def vtk(content: bytes) -> raw.Found:
             cells.append(_cells(source, _LISTS[name], int(words[1]), int(words[2]), offsets))
         elif name != "FIELD" and " ".join(words).upper() not in _DATASETS:
             raise raw.RefusedError(
-                f"holds {' '.join(words)[:60]}, read are unstructured grids and polygonal data; "
-                "ParaView saves others as .vtu"
+                f"holds {' '.join(words)[:60]}; only unstructured grids and polygonal data are "
+                "read; ParaView saves other data as .vtu"
             )
         source.check_end(0 if points is None or name == "POINTS" else len(points))
     raw.require_once(names)
@@ -211,8 +211,8 @@ def vtu(content: bytes) -> raw.Found:
     pieces = root.findall("UnstructuredGrid/Piece")
     if not pieces:
         raise raw.RefusedError(
-            f"holds a {root.get('type')} without pieces of an UnstructuredGrid, which alone is "
-            "read; ParaView saves others as one"
+            f"holds a {root.get('type')} without pieces of an UnstructuredGrid; only this kind "
+            "is read; ParaView saves other data as one"
         )
     plain, data = b"raw" in data.partition(b">")[0], data.partition(b"_")[2].rpartition(b"<")[0]
     read = partial(_array, root.attrib, data, plain)
@@ -237,7 +237,7 @@ def _array(
 ) -> np.ndarray:
     """Return the ``count`` numbers of an array; ``file`` are the attributes of the whole file.
 
-    The bytes ``appended`` behind all pieces are ``plain`` or in base 64.
+    The bytes ``appended`` after all pieces are ``plain`` or in base 64.
     """
     if node is None or not count:
         values = np.empty(0)
@@ -248,7 +248,7 @@ def _array(
         if node.get("format") == "appended":
             data = appended[int(node.get("offset", 0)) :]
         if not (plain and node.get("format") == "appended"):
-            # parts that are encoded one by one end with = or where the next begins
+            # parts that are encoded separately end with = or where the next part begins
             data = b"".join(map(binascii.a2b_base64, re.findall(rb"[^=]+=*", data)))
         order = ">" if file.get("byte_order") == "BigEndian" else "<"
         size = 8 if file.get("header_type") == "UInt64" else 4
@@ -264,5 +264,5 @@ def _array(
             data = data[size : size + int(np.frombuffer(data, word, 1)[0])]
         values = np.frombuffer(data, order + raw.TYPES[node.get("type", "").lower()])
     if len(values) != count:
-        raise raw.CutError(f"an array of {count} numbers, {len(values)} are there")
+        raise raw.CutError(f"an array has {len(values)} numbers instead of {count}")
     return values

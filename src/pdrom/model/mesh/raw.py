@@ -19,25 +19,25 @@ END = rb"[ \t]*(?:\r?\n|\r)"
 Field = tuple[str, int]
 """NumPy type, without byte order, and length of one part of a row of numbers."""
 Part = tuple[str, int, Callable[[int], int]]
-"""Field of a length that is a function of a number before it: its type, the field of the number."""
+"""Type of a field, the earlier field that determines its length, and length as a function of it."""
 
 
 class RefusedError(ValueError):
-    """A file that is not read; its message is for the user."""
+    """Error for a file that is not read; its message is for the user."""
 
 
 class UnreadableError(RefusedError):
-    """A file that is not valid in its format."""
+    """Error for a file that is not valid in its format."""
 
     def __init__(self, why: str) -> None:
         super().__init__(f"not a readable mesh ({why})")
 
 
 class CutError(UnreadableError):
-    """A truncated file, which stops before the end of its mesh."""
+    """Error for a truncated file, which stops before the end of its mesh."""
 
     def __init__(self, why: str) -> None:
-        super().__init__(f"cut off: {why}")
+        super().__init__(f"truncated: {why}")
 
 
 class Found(NamedTuple):
@@ -62,7 +62,7 @@ def found(points: np.ndarray, cells: Sequence[tuple[int, np.ndarray]]) -> Found:
 
 
 def unified(text: bytes, comments: bool = False) -> bytes:
-    """Return ``text`` with ends of lines as ``\\n``, and without ``comments`` that # begins."""
+    """Return ``text`` with ends of lines as ``\\n``, and without ``comments`` after #."""
     text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return re.sub(rb"#[^\n]*", b"", text) if comments else text
 
@@ -81,31 +81,31 @@ def require_once(names: Sequence[bytes]) -> None:
 
 
 def numbers(text: bytes, what: str) -> np.ndarray:
-    """Return the numbers in ``text``; UnreadableError, which begins with ``what``, if not all."""
+    """Return the numbers in ``text``; UnreadableError, beginning with ``what``, for other text."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
             return np.fromstring(text, sep=" ") if text.strip() else np.empty(0)
         except (DeprecationWarning, ValueError) as error:
-            raise UnreadableError(f"{what}: something else than numbers") from error
+            raise UnreadableError(f"{what}: something other than numbers") from error
 
 
 def whole(values: np.ndarray, what: str) -> np.ndarray:
-    """Return ``values`` as int64; UnreadableError, which begins with ``what``, for other values."""
+    """Return ``values`` as int64; UnreadableError, beginning with ``what``, for other values."""
     broken = values.dtype.kind == "f" and not (np.floor(values) == values).all()
     if broken or np.abs(values).max(initial=0) >= 2**53:
-        raise UnreadableError(f"{what} that are no whole numbers")
+        raise UnreadableError(f"{what} that are not whole numbers")
     return values.astype(np.int64)
 
 
 def check_end(text: bytes, last: float, vertices: int) -> None:
     """Raise `CutError` if ``text`` ends with ``last``, which may be the first digits of a number.
 
-    An index is not if one more digit exceeds the number of ``vertices``, which is 0 for others.
+    An index is complete if one more digit would exceed the number of ``vertices`` (0: no index).
     """
     ended = vertices and last % 1 == 0 and (last == 0 or 10 * abs(last) > vertices)
     if not ended and not text[-1:].isspace():
-        raise CutError("the last line has no end and may go on (add an end of line if not)")
+        raise CutError("the last line may be incomplete (if it is not, add an end of line)")
 
 
 _LINE = re.compile(rb"\s*([^\r\n]*)(?:\r?\n|\r|\Z)")
@@ -113,16 +113,16 @@ _WORD = re.compile(rb"^[ \t]*(?!(?:nan|inf)\b)[a-z$]", re.M | re.I)
 
 
 class Source:
-    """Lines and numbers of a file, one after another: binary with an order "<" or ">", or text "".
+    """Read lines and numbers of a file in turn: binary with byte order "<" or ">", or text ("").
 
-    Numbers of a text, up to the next line that begins with a word, become float64 at once.
+    In a text, numbers up to the next line that begins with a word are read together, as float64.
     """
 
     def __init__(self, content: bytes, order: str, start: int = 0) -> None:
         self.order, self.content, self._next = order, content, start
         if not order and b"\r" in content:
             self.content, self._next = unified(content[start:]), 0
-        self._numbers, self._at = np.empty(0), 0  # of a text; the next is behind them
+        self._numbers, self._at = np.empty(0), 0  # numbers of a text, before `_next`
 
     def line(self) -> bytes:
         """Return the next line that is not blank, stripped; b"" at the end of the file."""
@@ -134,7 +134,7 @@ class Source:
         return line[1].strip()
 
     def skip(self, end: bytes) -> None:
-        """Go on behind the next ``end``, or at the end of the file."""
+        """Continue after the next ``end``, or at the end of the file."""
         place = self.content.find(end, self._next)
         self._next = len(self.content) if place < 0 else place + len(end)
 
@@ -152,12 +152,12 @@ class Source:
         ]
 
     def values(self, count: int, kind: str) -> np.ndarray:
-        """Return ``count`` numbers (count,) of a type of `TYPES`; go on behind a "string"."""
-        for _ in range(count if kind == "string" else 0):  # a line, or bytes behind their number
+        """Return ``count`` numbers (count,) of a type of `TYPES`; skip values of type "string"."""
+        for _ in range(count if kind == "string" else 0):  # a line, or bytes after their number
             if not self.order:
                 self.skip(b"\n")
                 continue
-            size = 8 >> (self.content[self._next] >> 6)  # of the number, in its first two bits
+            size = 8 >> (self.content[self._next] >> 6)  # bytes of the number, in its first bits
             length = int.from_bytes(self.content[self._next : self._next + size], "big")
             self._next += size + length % (1 << 8 * size - 2)
         if kind == "string":
@@ -182,14 +182,14 @@ class Source:
             count -= size
 
     def lists(self, count: int) -> list[np.ndarray]:
-        """Return ``count`` lists of indices, each behind its length, as blocks (n, length)."""
+        """Return ``count`` lists of indices, each after its length, as blocks (n, length)."""
         return [rows for _, rows in self.ragged(count, ("i4", 1), ("i4", 0, int))]
 
     def _peek(self, fields: Sequence[Field]) -> int:
         """Return the count in the last of the ``fields`` of the next row."""
         value = self._ahead(1, fields)[f"f{len(fields) - 1}"][0, 0]
         if not 0 <= value < 2**31:
-            raise UnreadableError(f"a count of {value}")
+            raise UnreadableError(f"a count of {value} is not possible")
         return int(value)
 
     def check_end(self, vertices: int) -> None:
@@ -212,11 +212,11 @@ class Source:
         return left // max(1, self._kind(fields).itemsize)
 
     def _ahead(self, count: int, fields: Sequence[Field]) -> np.ndarray:
-        """Return ``count`` rows (count,) without going on."""
+        """Return the next ``count`` rows (count,) without consuming them."""
         if count == 0:
             return np.empty(0, self._kind(fields))
         there = self._there(fields)
         if not 0 <= count <= there:
-            raise CutError(f"{count} rows of numbers are announced, {there} are there")
+            raise CutError(f"{there} rows of numbers instead of {count}")
         data, at = (self.content, self._next) if self.order else (self._numbers, 8 * self._at)
         return np.ndarray(count, self._kind(fields), data, at)

@@ -1,9 +1,9 @@
 """Reading of one mesh file in a separate process, started by `pdrom.model.mesh.files`.
 
-A damaged file may take a reader very long, or unpack to gigabytes; limits then end only this
+A damaged file may take very long to read, or unpack to gigabytes; limits then end only this
 process. Its arguments are the file and limits: seconds, bytes, numbers of vertices and of cells.
-Its output is points (N, 3) float64 and cells (E, 3 or 4) int64 as .npy and a remark, or, with the
-exit status `REFUSED`, a sentence that states the fault.
+It writes points (N, 3) float64 and cells (E, 3 or 4) int64 as .npy and a remark, or, with the exit
+status `REFUSED`, a sentence that states the fault.
 """
 
 import os
@@ -81,7 +81,7 @@ def read(path: str, max_vertices: int, max_cells: int) -> tuple[np.ndarray, np.n
     except (MemoryError, raw.RefusedError):
         raise
     except Exception as error:
-        fault = f"cut off, or not a valid {suffix} file; `meshio convert` may read it"
+        fault = f"truncated, or not a valid {suffix} file; `meshio convert` may read it"
         raise raw.UnreadableError(fault) from error
 
 
@@ -108,14 +108,14 @@ def cells_of(found: raw.Found) -> tuple[np.ndarray, str]:
     sizes, corners = sizes[flat], corners[np.repeat(flat, sizes)]
     if not len(sizes):
         what = "only lines or points, which are not simulated" if len(kinds) else "no cells"
-        required = "triangles or tetrahedra are required, as gmsh makes them from a closed line"
+        required = "triangles or tetrahedra are required; gmsh makes them from a closed line"
         raise raw.RefusedError(f"holds {what}: {required} or surface")
     if sizes.min() < 3:
         raise raw.UnreadableError("faces of fewer than 3 corners")
     if sizes.max() == 3:
         return corners.reshape(-1, 3), ""
     if not ((corners >= 0) & (corners < len(points))).all():
-        raise raw.UnreadableError(f"corners that are none of its {len(points)} vertices")
+        raise raw.UnreadableError(f"corners that are not among its {len(points)} vertices")
     starts, triangles, owners = np.cumsum(sizes) - sizes, [], []
     for size in np.unique(sizes):
         polygons = np.flatnonzero(sizes == size)
@@ -128,10 +128,10 @@ def cells_of(found: raw.Found) -> tuple[np.ndarray, str]:
 
 
 def split(points: np.ndarray, polygons: np.ndarray) -> np.ndarray:
-    """Return the triangles (m (n - 2), 3) of ``polygons`` (m, n), which all begin at one corner.
+    """Return the triangles (m (n - 2), 3) of ``polygons`` (m, n), each split from one corner.
 
-    It is the corner with the shortest diagonals, the first of equal ones, whose triangles are all
-    turned as the polygon. Raises RefusedError if a polygon is so concave that it has none.
+    Of the corners whose triangles all have the polygon's orientation, the first with the shortest
+    diagonals is chosen. Raises RefusedError if a polygon is so concave that no corner is suitable.
     """
     count, size = polygons.shape
     if size == 3:
@@ -168,4 +168,4 @@ def _check_faces(triangles: np.ndarray, tetrahedra: np.ndarray) -> None:
     weights = np.array([size**2, size, 1])
     if not np.isin(*(np.sort(corners, axis=1) @ weights for corners in (triangles, faces))).all():
         fault = "holds tetrahedra and triangles that are not their faces"
-        raise raw.RefusedError(f"{fault}, allowed: only one of both")
+        raise raw.RefusedError(f"{fault}; only one of these kinds is allowed")

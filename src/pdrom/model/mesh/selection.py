@@ -28,7 +28,7 @@ def require_ordered(box: Any) -> Any:
 def require_direction(plane: Any) -> Any:
     """Return ``plane``; ValueError if its ``normal`` is too short to define a direction."""
     if not np.linalg.norm(plane.normal) >= 1e-12:
-        raise ValueError(f"normal = {list(plane.normal)}: has no direction")
+        raise ValueError(f"normal = {list(plane.normal)}: too short for a direction")
     return plane
 
 
@@ -37,7 +37,7 @@ class Shape(ConfigModel):
 
     @abstractmethod
     def chosen(self, mesh: Mesh) -> np.ndarray:
-        """Return the indices (n,) of the selected vertices of ``mesh``, ascending, may be empty."""
+        """Return the indices (n,), ascending or empty, of the selected vertices of ``mesh``."""
 
 
 class Box(Shape):
@@ -192,7 +192,7 @@ for _combination in (Union, Intersection, Complement):
 SIDES = {
     f"{axis}_{end}": (i, s) for i, axis in enumerate("xyz") for end, s in (("min", -1), ("max", 1))
 }
-# words for the same sides, in this order, which fit scenes in which y points up
+# other names of these sides, in this order, for scenes in which y points up
 WORDS = dict(zip(("left", "right", "bottom", "top", "back", "front"), SIDES.values(), strict=True))
 TOLERANCE = 1e-6  # distance to a side up to which vertices belong to it, relative to the extent
 
@@ -218,7 +218,7 @@ def _chosen(mesh: Mesh, selection: Selection) -> np.ndarray:
         return selection.chosen(mesh)
     outside = [index for index in selection if not 0 <= index < mesh.vertices]
     if outside:
-        raise SceneError(f"selection holds {outside[0]}: allowed are 0 to {mesh.vertices - 1}")
+        raise SceneError(f"selection: vertex {outside[0]} is not in 0 to {mesh.vertices - 1}")
     return np.unique(np.asarray(selection, dtype=np.int64))
 
 
@@ -239,13 +239,13 @@ def _part(
     """Return the vertices of component ``index`` of the graph of ``edges`` on vertices ``among``.
 
     Components are sorted by the sum of their ``sizes`` (N,), largest first; ties: smallest vertex.
-    If there is no such component, the message of the SceneError calls it ``what``.
+    The SceneError for an ``index`` that is too large calls the component ``what``.
     """
     n = mesh.vertices
     graph = sparse.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
     labels = csgraph.connected_components(graph, directed=False)[1][among]
     parts = [among[labels == label] for label in np.unique(labels)]
-    # sizes are rounded, so that those equal by symmetry are equal on every machine
+    # rounding makes sizes that are equal by symmetry equal on every machine
     parts.sort(key=lambda part: (-round(float(sizes[part].sum()) / mesh.extent, 9), part[0]))
     if index >= len(parts):
         raise SceneError(f"selection {what}: index = {index}, the mesh has {len(parts)}")
@@ -255,8 +255,8 @@ def _part(
 def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> np.ndarray:
     """Return ``count`` of the vertices ``candidates`` (n,) by farthest-point sampling.
 
-    The first is nearest to the centre of the bounding box of all ``points`` (N, 3) m, each next one
-    is farthest from those chosen. Ties: the first of ``candidates``.
+    The first vertex is nearest to the centre of the bounding box of all ``points`` (N, 3) m, each
+    further vertex is farthest from those already chosen. Ties: the first of ``candidates``.
     """
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     chosen = [int(candidates[np.argmin(_distance(points[candidates], centre))])]
@@ -268,5 +268,5 @@ def farthest_points(points: np.ndarray, candidates: np.ndarray, count: int) -> n
 
 
 def _distance(points: np.ndarray, point: np.ndarray) -> np.ndarray:
-    # distances are rounded, so that those equal by symmetry are equal on every machine
+    # rounding makes distances that are equal by symmetry equal on every machine
     return np.round(np.linalg.norm(points - point, axis=1), 12)

@@ -20,8 +20,8 @@ IGNORED = frozenset(
 
 def obj(content: bytes) -> raw.Found:
     """Read Wavefront's .obj, without weights w and colours of vertices."""
-    # comments are removed first, as a backslash at their end does not continue the line; one at the
-    # end of the file stays there, and is no number
+    # comments are removed first, as a backslash at their end does not continue the line; if the
+    # file ends with a backslash, it is kept and makes the reading of numbers fail
     text = re.sub(rb"\\[ \t]*\n(?!\s*\Z)", b" ", raw.unified(content, comments=True))
     vertices, faces, lines, last = list[bytes](), list[bytes](), 0, b""
     before: list[int] = []  # number of vertices before each face; a corner -1 is the last of these
@@ -38,7 +38,7 @@ def obj(content: bytes) -> raw.Found:
             word = last[:20].decode(errors="replace")
             raise raw.UnreadableError(f"the statement {word!r} is not read")
     points = _columns(vertices)
-    # what follows each corner of the last face; parts may be missing there
+    # parts of each corner of the last face, which a truncated file may lack
     forms = {re.sub(rb"[^/]+", b"1", corner) for corner in faces[-1].split()} if faces else set()
     if any(b"/" in face for face in faces):
         faces = [re.sub(rb"/\S*", b"", face) for face in faces]
@@ -55,9 +55,9 @@ def obj(content: bytes) -> raw.Found:
 
 
 def _closed(sizes: np.ndarray, corners: np.ndarray) -> bool:
-    """Return whether the last face has all its corners, as all faces have the same number of them.
+    """Return whether the last face is complete: all faces have the same number of corners.
 
-    If not, a whole face ends where it began, at an edge that it shares with another face.
+    If not, its last edge, which leads back to its first corner, must belong to another face.
     """
     following, ends = np.roll(corners, -1), np.cumsum(sizes)
     following[ends - 1] = corners[ends - sizes]
@@ -73,7 +73,7 @@ def _columns(rows: list[bytes]) -> np.ndarray:
     try:
         return np.loadtxt(rows, usecols=range(3), ndmin=2) if rows else np.empty((0, 3))
     except (ValueError, IndexError) as error:
-        raise raw.UnreadableError("vertices with something else than 3 numbers") from error
+        raise raw.UnreadableError("vertices with something other than 3 numbers") from error
 
 
 def off(content: bytes) -> raw.Found:
@@ -81,11 +81,11 @@ def off(content: bytes) -> raw.Found:
     text = raw.unified(content, comments=True)
     head = re.match(rb"\s*(?:(?:ST|C|N)*OFF\b)?\s*(\d+)[ \t]+(\d+)[ \t\d]*\n", text, re.I)
     if head is None:
-        raise raw.UnreadableError("no head: OFF, then numbers of vertices and faces as text")
+        raise raw.UnreadableError("no header: OFF, then numbers of vertices and faces as text")
     vertices, count = int(head[1]), int(head[2])
     lines = [line for line in text[head.end() :].split(b"\n") if line.strip()]
     if len(lines) < vertices + count:
-        raise raw.CutError(f"{vertices} + {count} lines are announced, {len(lines)} are there")
+        raise raw.CutError(f"{len(lines)} lines instead of {vertices} + {count}")
     if len(lines) > vertices + count:
         raise raw.UnreadableError("more rows than the file announces")
     faces = lines[vertices : vertices + count]
@@ -101,7 +101,7 @@ def _face(line: bytes) -> bytes:
     words = line.split()
     size = int(words[0])
     if not 0 < size < len(words):
-        raise raw.CutError(f"a face of {size} corners, {len(words) - 1} are there")
+        raise raw.CutError(f"a face of {size} corners lists {len(words) - 1}")
     return b" ".join(words[: 1 + size])
 
 
@@ -124,7 +124,7 @@ def stl(content: bytes) -> raw.Found:
         text = re.sub(rb"^[ \t]*(?:end)?solid\b.*$", b"", text, flags=re.M)
         values = re.sub(_FACET, rb"\1 \2 \3 \4 \5 \6 \7 \8 \9", text)
         corners = raw.numbers(values, "facets").reshape(-1, 3)
-    corners = corners + np.float64(0.0)  # adding makes 0 of -0
+    corners = corners + np.float64(0.0)  # turns -0 into 0
     order = np.lexsort(corners.T[::-1])
     points = corners[order]
     new = (np.diff(points, axis=0, prepend=np.nan) != 0.0).any(axis=1)
@@ -141,7 +141,7 @@ def ply(content: bytes) -> raw.Found:
     """Read .ply, text or binary: positions and corners, without any other property."""
     head = re.match(rb"ply\s[\s\S]*?[\r\n]end_header" + raw.END, content)
     if head is None:
-        raise raw.UnreadableError("no head from `ply` to `end_header`")
+        raise raw.UnreadableError("no header from `ply` to `end_header`")
     elements: list[tuple[bytes, int, list[list[str]]]] = []
     order = b""
     for line in head[0].splitlines():

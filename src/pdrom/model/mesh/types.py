@@ -79,7 +79,7 @@ def stored_mesh(group: h5py.Group) -> Mesh:
 
 
 def barycentric_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return areas (N,) m^2 of ``points`` (N, 3) m: a third of those of the triangles around."""
+    """Return areas (N,) m^2 of vertices at ``points`` (N, 3) m: a third of their triangles."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return np.bincount(triangles.ravel(), np.repeat(area / 3.0, 3), minlength=len(points))
@@ -88,7 +88,7 @@ def barycentric_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def vertex_measures(mesh: Mesh) -> np.ndarray:
     """Return the volume, m^3, or in a surface mesh the area, m^2, of each vertex at rest, (N,).
 
-    It is a quarter of the tetrahedra, or a third of the triangles, around the vertex.
+    It is a quarter of the volume of the tetrahedra, or a third of the triangles, at the vertex.
     """
     if len(mesh.tetrahedra) == 0:
         return barycentric_areas(mesh.points, mesh.triangles)

@@ -101,7 +101,7 @@ def test_files_are_read_as_the_mesh_of_the_scene(tmp_path):
     mesh = {"kind": "file", "path": "fine.obj", "scale": 1e-3}
     assert set(api.cost(api.build_scene(tmp_path, mesh, **keys), [path]).vertices) == {35, 12}
     unscaled = api.build_scene(mesh=(fine.points, fine.triangles), **keys)
-    with pytest.raises(SceneError, match=f"^{path}: scene 'scene': .* another unit"):
+    with pytest.raises(SceneError, match=f"^{path}: scene 'scene': .* its unit"):
         api.cost(unscaled, [path])
 
 

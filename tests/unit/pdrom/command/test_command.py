@@ -203,13 +203,13 @@ def test_an_open_seam_is_named_and_merged(folder, capsys, caplog):
     """Vertices that nearly coincide, or are exact copies, and a vertex in no element."""
     (folder / "a.obj").write_text(SEAM.format("1e-7", "1.0000001"))
     assert run(["new", "a", "--mesh", "a.obj"]) == Status.DONE
-    found = "2 connected parts, 2 pairs of vertices closer than 1e-06 of its extent"
+    found = "2 connected parts, 2 pairs of vertices closer than 1e-06 of the extent"
     assert f"6 vertices, 2 triangles, {found}; x" in (folder / "a.yaml").read_text()
     assert "merge: 1.0e-06" in caplog.text
     (folder / "b.obj").write_text(SEAM.format(0, 1))
     assert "`merge: 1.0e-06` below `mesh`" in refusal(capsys, ["new", "b", "--mesh", "b.obj"])
     (folder / "c.obj").write_text(SEAM.format(0, 1).replace("f 1", "v 9 9 9\nf 1"))
-    assert "leaves out those" in refusal(capsys, ["new", "c", "--mesh", "c.obj"])
+    assert "leaves them out" in refusal(capsys, ["new", "c", "--mesh", "c.obj"])
     assert "--mesh is required" in refusal(capsys, ["new", "c", "--merge", "1e-6"])
     for name in "abc":
         assert run(["new", f"{name}2", "--mesh", f"{name}.obj", "--merge", "1e-6"]) == Status.DONE

@@ -37,9 +37,9 @@ OWN, BARE = {"weight": 1.0}, {"effect": "strain", "thickness": 1e-3}
 
 @pytest.mark.parametrize(
     ("effects", "message"),
-    [([SOLID | OWN], "weight = 1.0: not beside young, poisson"),
-     ([SHEET | {"minimum": 0.9}], "minimum = 0.9: not beside young"),
-     ([BARE | OWN], "weight = 1.0: not beside young"),
+    [([SOLID | OWN], "weight = 1.0: not allowed with young, poisson"),
+     ([SHEET | {"minimum": 0.9}], "minimum = 0.9: not allowed with young"),
+     ([BARE | OWN], "weight = 1.0: not allowed with young"),
      ([SOLID | {"thickness": 1e-3}], "unknown key 'thickness' (allowed: effect, young, poisson"),
      ([SOLID | {"effect": "strain"}], "key 'thickness' is missing"),
      ([SOLID | {"poisson": 0.5}], "poisson = 0.5: Input should be less than 0.5"),

@@ -95,7 +95,7 @@ def test_large_meshes_are_named(square, monkeypatch, limit, message):
     [
         ("import os\nos.kill(os.getpid(), 9)", r"ended by signal 9 \(Killed\)"),
         ("raise RuntimeError('boom')", "failed with status 1: RuntimeError: boom"),
-        ("raise SystemExit(7)", "failed with status 7: without a word"),
+        ("raise SystemExit(7)", "failed with status 7: no error message"),
     ],
 )
 def test_a_reader_that_ends_early_is_named(square, monkeypatch, script, message):

@@ -93,7 +93,7 @@ def test_the_fewer_ones_are_turned(triangles, seed, share):
 def test_a_strip_with_one_side_is_refused():
     """Möbius' strip of six triangles: the ends of a strip are joined with half a turn."""
     strip = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4], [4, 5, 1], [5, 0, 1]])
-    with pytest.raises(MeshError, match=r"strip: the surface about triangle 0 .* one side only"):
+    with pytest.raises(MeshError, match=r"strip: the surface around triangle 0 .* one side only"):
         turned_alike(Mesh(np.zeros((6, 3)), strip), "strip")
     assert 0 not in turned_alike(Mesh(np.zeros((6, 3)), strip[:-1]), "open strip")[1]
 
@@ -153,7 +153,7 @@ def test_cells_the_other_way_round_are_turned_and_triangles_said(tmp_path, caplo
     cells = SHEET.triangles.copy()
     cells[2] = cells[2, ::-1]
     assert np.array_equal(read(tmp_path, SHEET.points, triangle=cells).triangles, SHEET.triangles)
-    assert "1 of 8 triangles are listed the other way round" in caplog.text
+    assert "1 of 8 triangles have the opposite orientation" in caplog.text
 
 
 @pytest.mark.parametrize("joined", [False, True], ids=["two components", "joined in one vertex"])
@@ -181,7 +181,7 @@ def test_merging_keeps_the_first_of_close_vertices_and_leaves_flat_elements_out(
     mesh = merged(Mesh(copies, triangles), 1e-7, "mesh")
     assert np.array_equal(mesh.points, SHEET.points)
     assert np.array_equal(mesh.triangles, SHEET.triangles)
-    assert "11 vertices are merged into 9; 1 elements become flat" in caplog.text
+    assert "11 vertices are merged into 9; left out are 1 elements" in caplog.text
     assert seams(SHEET) == "1 connected part"
     assert MeshFile(kind="file", path="a.obj").model_dump() == {
         "kind": "file", "path": "a.obj", "scale": 1.0,

@@ -54,18 +54,18 @@ def test_obj(tmp_path, content):
     [
         (V + "f 1 2 3\nf 1 3 4\ncall b.obj\n", "statement 'call' is not read"),
         (V + "f 1 2 3\nsurf 0 1 0 1 1 2 3\n", "statement 'surf'"),
-        (V + "f 1 2 3\nf 1 3 4.5\n", "corners that are no whole numbers"),
+        (V + "f 1 2 3\nf 1 3 4.5\n", "corners that are not whole numbers"),
         (V + "f 1 2 3\nf 1 3\n", "fewer than 3 corners"),
         (V.replace("v 1 .25 1", "v 1 .25") + "f 1 2 3\nf 1 3 4\n", "not a readable mesh (vertices"),
-        (V * 5 + "f 1 2 3\nf 1 3 2", "cut off: .* go on"),
-        (V + "f 1 2 3\nf 1 3", "cut off"),
-        (V + "v 2 0 0\nv 2 0 1\nf 1 2 3 4\nf 2 5 6", "cut off"),  # of a quadrilateral
-        (V + "f 1 2 3\nf 1/1 3/3 4", "cut off"),
+        (V * 5 + "f 1 2 3\nf 1 3 2", "truncated: .* incomplete"),
+        (V + "f 1 2 3\nf 1 3", "truncated"),
+        (V + "v 2 0 0\nv 2 0 1\nf 1 2 3 4\nf 2 5 6", "truncated"),  # of a quadrilateral
+        (V + "f 1 2 3\nf 1/1 3/3 4", "truncated"),
         (V + "l 1 2 3 4\n", "only lines or points, which are not simulated"),
-        ("f -3 -2 -1\nv 0 0 0\nv 1 0 0\nv 1 0 1.5", "cut off: .* go on"),
-        (V + "f 1 2 3 \\\n", "faces: something else"),
+        ("f -3 -2 -1\nv 0 0 0\nv 1 0 0\nv 1 0 1.5", "truncated: .* incomplete"),
+        (V + "f 1 2 3 \\\n", "faces: something other"),
         # of a polygon after a triangle and a quadrilateral: it ends at no edge of another face
-        (V + "v 2 0 0\nv 2 0 1\nf 1 2 3\nf 1 2 3 4\nf 1 2 5 6", "cut off"),
+        (V + "v 2 0 0\nv 2 0 1\nf 1 2 3\nf 1 2 3 4\nf 1 2 5 6", "truncated"),
     ],
 )
 def test_faulty_obj(tmp_path, content, why):
@@ -160,15 +160,15 @@ def test_plain_files_are_read(tmp_path, name, content):
         ("a.off", f"OFF\n4 1 0\n{XYZ}{FACES}", "more rows than the file"),
         ("a.ply", ply(VERTEX + FACE, XYZ + FACES + FACES), "more numbers than announced"),
         ("a.obj", V.replace("v 1", "v\nv 1", 1) + "f 1 2 3\nf 1 3 4\n", "vertices: a row"),
-        ("a.off", f"OFF\n4 2 0\n{XYZ}3 0 1 2\n3 0 2", "cut off: a face of 3 corners"),
-        ("a.off", f"4OFF\n4 2 0\n{XYZ}{FACES}", "no head"),
-        ("a.ply", ply(VERTEX + FACE, XYZ + "3 0 1 2\n"), "cut off"),
-        ("a.ply", binary_ply("uchar")[:-5], "cut off"),
+        ("a.off", f"OFF\n4 2 0\n{XYZ}3 0 1 2\n3 0 2", "truncated: a face of 3 corners"),
+        ("a.off", f"4OFF\n4 2 0\n{XYZ}{FACES}", "no header"),
+        ("a.ply", ply(VERTEX + FACE, XYZ + "3 0 1 2\n"), "truncated"),
+        ("a.ply", binary_ply("uchar")[:-5], "truncated"),
         ("a.ply", ply(VERTEX + "element face 2\nproperty int a\n", XYZ + "1\n2\n"), "no cells"),
         ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID.replace("TYPES 2\n5", "TYPES 1")),
-             "cut off"),
+             "truncated"),
         ("a.vtk", legacy("UNSTRUCTURED_GRID", f" points 4 double\n{XYZ}" + GRID), "POINTS appears"),
-        ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID.replace("YPES 2\n5", "ypes 1")), "cut off"),
+        ("a.vtk", legacy("UNSTRUCTURED_GRID", GRID.replace("YPES 2\n5", "ypes 1")), "truncated"),
         ("a.mesh", MEDIT.replace("Triangles", f" vertices 4\n{NODES}Triangles"), "ces appears"),
         ("a.ply", ply(VERTEX + VERTEX + FACE, XYZ + XYZ + FACES), "vertex appears twice"),
         ("a.msh", gmsh4("4").replace("$Elements", f"$Nodes\n{NODES}$EndNodes\n$Elements"),
@@ -279,7 +279,7 @@ def test_stl(tmp_path, content):
     points, cells = read_here(path)
     assert points[cells].astype(np.float32).tolist() == [POINTS[:3].astype(np.float32).tolist()]
     path.write_bytes(path.read_bytes()[:100])
-    assert "cut off" in refusal(path)
+    assert "truncated" in refusal(path)
 
 
 BINARY = (
@@ -304,7 +304,7 @@ PARTS = (
 def test_msh_of_other_programs_and_of_partitions(tmp_path, content):
     square(tmp_path / "a.msh", content)
     (tmp_path / "a.msh").write_bytes(content[: content.index(b"$EndElements")])
-    assert "cut off" in refusal(tmp_path / "a.msh")
+    assert "truncated" in refusal(tmp_path / "a.msh")
 
 
 def piece(count: int) -> str:
