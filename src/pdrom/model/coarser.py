@@ -55,7 +55,7 @@ class Coarser:
         return None if run is None else np.stack([self.positions(y) for y in run])
 
     def state(self, state: State) -> State:
-        """Interpolate a ``state`` of the fine vertices at the coarse ones."""
+        """Interpolate a ``state`` of the fine vertices at the coarse vertices."""
         moved, velocities = state.positions - self.fine.points, state.velocities
         return State(self.scene.mesh.points + self._back @ moved, self._back @ velocities)
 

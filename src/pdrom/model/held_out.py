@@ -50,7 +50,7 @@ class HeldOut(ConfigModel):
     def variant(
         self, effects: Sequence[EffectConfig], motion: HeldOutMotion, time_step: float
     ) -> tuple[EffectConfig, ...]:
-        """Return effects of the test ``motion``; ``effects`` are those of the training trajectory."""
+        """Return the effects of a test trajectory; ``effects`` are those of the training."""
         own = [self._changed(effect, motion, time_step) for effect in effects]
         if motion != FIRST and self.kick:
             seed = (self.seed + MOTIONS.index(motion)) % 2**63

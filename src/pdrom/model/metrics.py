@@ -73,7 +73,8 @@ def shape_differences(
 def affine_residuals(rest: np.ndarray, reference: np.ndarray, masses: np.ndarray) -> np.ndarray:
     """Return norms (F,) m of ``reference`` minus the best affine image of the shape ``rest``.
 
-    Norms are those of `shape_differences`; ``rest`` (N, 3), ``reference`` (F, N, 3), m; masses, kg.
+    Norms are defined as in `shape_differences`. ``rest`` is (N, 3) m, ``reference`` (F, N, 3) m,
+    ``masses`` (N,) kg.
     """
     root = np.sqrt(masses / masses.mean())[:, None]
     q, sigma, _ = np.linalg.svd(root * np.c_[rest, np.ones(len(rest))], full_matrices=False)

@@ -33,7 +33,7 @@ WORK = 20_000_000  # limit of evaluations times vertices in a trial of `remedy`:
 def trajectory(scene: Scene, perturbation: np.ndarray | None = None, **stepper: Any) -> np.ndarray:
     """Return positions (F + 1, N, 3) m of a run of ``scene``, the initial positions first.
 
-    ``perturbation`` (N, 3) m changes the initial ones; ``stepper`` are options of `Scene.stepper`.
+    ``perturbation`` (N, 3) m is added to the first; ``stepper`` are options of `Scene.stepper`.
     """
     start = scene.initial_state(perturbation)
     return followed(scene.stepper(**stepper), start, scene.config.frames)

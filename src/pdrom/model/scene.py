@@ -109,7 +109,7 @@ class SceneConfig(ConfigModel):
         """Number of iterations of each frame; SceneError if it differs between frames."""
         if isinstance(self.iterations, int):
             return self.iterations
-        fault = "only full-order runs iterate until an estimated error; give a number here"
+        fault = "only full-order runs iterate until an estimated error is reached; give a number"
         raise SceneError(f"scene '{self.name}': iterations = {dict(self.iterations)}: {fault}")
 
     @property
@@ -192,7 +192,7 @@ class Scene:
 
     @classmethod
     def build(cls, config: SceneConfig, mesh: Mesh, masses: np.ndarray | None = None) -> "Scene":
-        """Return the scene of ``config`` on ``mesh``, with ``masses`` (N,) kg instead if given.
+        """Return the scene of ``config`` on ``mesh``; if given, ``masses`` (N,) kg replace others.
 
         MeshError if the mesh is faulty, SceneError if a selection is empty, there are too many
         frames, or effects contradict each other.
@@ -248,7 +248,7 @@ class Scene:
                 if first.active(frame) and second.active(frame):
                     raise SceneError(
                         f"scene '{self.config.name}': vertex {shared[0]} is held by "
-                        f"'{first.name}' and by '{second.name}' in frame {frame}: change one"
+                        f"'{first.name}' and by '{second.name}' in frame {frame}: change one effect"
                     )
 
     def log_holds(self) -> None:

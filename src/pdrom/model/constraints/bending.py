@@ -92,7 +92,7 @@ def _half_spheres(work, manifold, block):
 
 @lanes.lane_function
 def _to_rims(work, manifold, first):
-    """Replace directions below the rim (equator) of their half sphere by the nearest on the rim."""
+    """Replace directions below the rim (equator) of their half sphere by the nearest rim points."""
     for lane in range(lanes.LANES):
         n, unit = lanes.load(manifold, first + POLE, lane), lanes.load(work, P, lane)
         height = work[HEIGHT * lanes.LANES + lane]

@@ -29,7 +29,7 @@ def _squares(x, y, z):
 
 @lane_function
 def _rest_lengths(x, y, z, length, rest, place):
-    """Scale four edges x, y, z to rest ``length``; one of length zero becomes its ``rest`` edge."""
+    """Scale four edges x, y, z to rest ``length``; edges of length zero become ``rest`` edges."""
     square = _squares(x, y, z)
     factor = divide(length, arithmetic.square_root(square))
     px, py, pz = multiply(factor, x), multiply(factor, y), multiply(factor, z)

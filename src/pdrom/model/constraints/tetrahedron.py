@@ -129,7 +129,7 @@ def _nearest(work, low, high):
 def forces(work, geometry, block):
     """Write forces S^T W p on the corners and add w |S q - p|^2 to the energies, all in ``work``.
 
-    ``geometry`` has the packed numbers of all blocks, ``block`` is the index of one.
+    ``geometry`` has the packed numbers of all blocks, ``block`` is the index of this block.
     """
     weight, start = block * GEOMETRY + WEIGHT, block * GEOMETRY + OPERATOR
     for lane in range(LANES):

@@ -91,7 +91,7 @@ def gradients(work, geometry, block):
 def forces(work, geometry, block):
     """Write forces S^T W p on the corners and add w |S q - p|^2 to the energies, all in ``work``.
 
-    ``geometry`` has the packed numbers of all blocks, ``block`` is the index of one.
+    ``geometry`` has the packed numbers of all blocks, ``block`` is the index of this block.
     """
     weight = (block * GEOMETRY + WEIGHT) * LANES
     first = (block * GEOMETRY + OPERATOR) * LANES

@@ -88,7 +88,7 @@ class EstimatingStepper(Stepper):
         if not self._due:
             return super().step(state, frame, on_last_iterate)
         self._start = flat(state.positions)
-        after = super().step(state, frame, on_last_iterate or (lambda y: None))  # iterates here
+        after = super().step(state, frame, on_last_iterate or (lambda y: None))  # uses `_iterate`
         if self._found > (self.worst[0] if self.worst else -1.0):
             self.worst = self._found, frame, state
         self.errors[frame] = self._found

@@ -178,7 +178,7 @@ class Contact(Effect):
     """Height y, m, for a floor: a contact that only moves lower vertices up to y; else None."""
 
     def apply(self, positions: np.ndarray, before: np.ndarray, held: np.ndarray) -> None:
-        """Resolve the contact at all vertices except the ``held`` ones (n,); changes ``positions``.
+        """Resolve the contact, changing ``positions`` of all vertices except ``held`` (n,).
 
         A contact that moves several vertices together (self-collision) overrides this method.
 
@@ -261,7 +261,7 @@ def held_path(
 
     These frames end before the first in which the set of held vertices changes or a hold begins,
     since targets of that hold depend on positions that are not yet known. ``positions`` (N, 3) m
-    are from the beginning of the first frame, ``anchors`` are the result for the previous frame.
+    are from the beginning of the first frame, ``anchors`` the third result for the previous one.
     A hold without an anchor is assumed to begin in the first frame.
     """
     frame, now = frames.start, list(anchors) or [None] * len(boundaries)

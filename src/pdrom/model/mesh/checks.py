@@ -63,14 +63,14 @@ def check_indices(cells: np.ndarray, vertices: int, kind: str, name: str) -> Non
     outside = np.flatnonzero(((cells < 0) | (cells >= vertices)).any(axis=1))
     if len(outside):
         raise MeshError(
-            f"{name}: {kind} {outside[0]} names vertex {cells[outside[0]].tolist()}, "
+            f"{name}: {kind} {outside[0]} has the corners {cells[outside[0]].tolist()}, "
             f"allowed: 0 to {vertices - 1}"
         )
     ordered = np.sort(cells, axis=1)
     twice = np.flatnonzero((np.diff(ordered, axis=1) == 0).any(axis=1))
     if len(twice):
         raise DegenerateElementError(
-            f"{name}: {kind} {twice[0]} names a vertex twice: {cells[twice[0]].tolist()}"
+            f"{name}: {kind} {twice[0]} has a corner twice: {cells[twice[0]].tolist()}"
         )
 
 

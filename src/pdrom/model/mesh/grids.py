@@ -16,7 +16,7 @@ import numpy as np
 
 from pdrom.model.mesh import raw
 
-HIGHER = "elements of higher order; only linear ones are read: Gmsh writes them with `-order 1`"
+HIGHER = "elements of higher order; only linear elements are read (Gmsh: `-order 1`)"
 _LINEAR = {1: (raw.LINE, 2), 2: (raw.TRIANGLE, 3), 3: (raw.QUAD, 4), 4: (raw.TETRA, 4)}
 _LINEAR |= {5: (12, 8), 6: (13, 6), 7: (14, 5), 15: (raw.VERTEX, 1)}
 
@@ -143,7 +143,7 @@ def vtk(content: bytes) -> raw.Found:
     """Read VTK's legacy .vtk, versions 1 to 5: unstructured grids and polygonal data."""
     head = _VTK.match(content)
     if head is None or not head[1].lower().startswith(b"# vtk datafile version"):
-        raise raw.UnreadableError(f"{raw.begin(content)}, no header of VTK's legacy format")
+        raise raw.UnreadableError(f"{raw.begin(content)}, not with VTK's legacy header")
     source = raw.Source(content, ">" if head[3].upper() == b"BINARY" else "", head.end())
     points, kinds, cells, names = None, None, list[raw.Found](), list[bytes]()
     while words := source.line().decode(errors="replace").split():

@@ -103,7 +103,7 @@ AT = "snapshots/spring/frames"
         ("small", first_of("snapshots/spring/p", np.nan), "snapshots of spring: entry"),
         ("small", lambda file: file.attrs.modify("configuration", "{"), "holds no sound run"),
         ("small", lambda file: file["mesh"].pop("points"), "points"),
-        ("small_small", first_of("mesh/triangles", 999), "triangle 0 names vertex"),
+        ("small_small", first_of("mesh/triangles", 999), "triangle 0 has the corners"),
         ("small", first_of("positions", 5.0), "frame 0 of the"),
         ("small", first_of("timings", -1e9), "a time is below zero"),
         ("small", shortened("frame_error"), "frame_error of"),
