@@ -78,7 +78,7 @@ FLAT = replace(SHORT, tetrahedra=np.vstack([SHORT.tetrahedra, [[0, 1, 2, 2]]]))
         (cloth(5, 5), "25 vertices and triangles; required are fewer than 180 vertices and tetr"),
         (replace(SHORT, points=1e-3 * SHORT.points), "ends 2.* m from the scene's: check"),
         (bar(41, 2, 2), "no vertex of the scene's mesh is near its vertex"),
-        (FLAT, "vertex"),
+        (FLAT, "corner"),
     ],
     ids=["as fine", "surface", "millimetres", "finer along x", "degenerate"],
 )
