@@ -80,10 +80,10 @@ FACTS = {
 
 def table_page(name: str, csv: bytes, template: str) -> str:
     """Return the page of table ``name``: rows (``csv``), shell command, meanings of columns."""
-    table = declared().get(name)
+    table, marked = declared().get(name), partial(re.sub, r"`([^`]*)`", r"<code>\1</code>")
     columns = "".join(
         f"<tr data-column='{c.name}'><th scope=row>{c.name}</th>"
-        f"<td>{escape(c.meaning)}</td><td>{escape(c.unit)}</td>"
+        f"<td>{marked(escape(c.meaning))}</td><td>{escape(c.unit)}</td>"
         f"<td>{c.quantity}: {escape(QUANTITIES[c.quantity])}</td>"
         f"<td>{f'{c.within:g}' if c.quantity in TOLERANCES else 'not compared'}</td></tr>"
         for c in (table.columns if table else ())
