@@ -1,4 +1,4 @@
-"""The study: experiments, tables, figures, verdicts and the paper, made with pdrom.
+"""Make the study with pdrom: experiments, tables, figures, verdicts and the paper.
 
-Data flow in one direction only: from runs to tables, figures and the paper.
+Data flow only from runs to tables, and from tables to figures and the paper.
 """

@@ -208,7 +208,7 @@ def test_a_file_that_is_edited_while_a_job_reads_it_is_refused(name, fresh):
     fresh.path("release").touch()
     said, _ = process.communicate(timeout=600)
     assert process.returncode != 0
-    assert f"{name}: edited while the run was at work; run the same" in last_lines(said)
+    assert f"{name}: edited during the run; run the same command" in last_lines(said)
     assert not list(fresh.path(f"{MICRO_RESULTS}/meshes").glob("[!.]*.h5"))
     fresh.finish(RUN)
 

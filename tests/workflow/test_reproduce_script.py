@@ -125,13 +125,13 @@ def rename(folder: Folder, name: str) -> None:
     folder.path = folder.path.rename(folder.path.with_name(name))
 
 
-NO_WHEELS = r"\(some packages have no wheels for other ones\), found only"
+NO_WHEELS = r"\(some packages have no wheels for other versions\), found only"
 UNFIT = {
     "no python": (
         lambda f: f.python.unlink(),
-        r"Python 3\.11, 3\.12 or 3\.13 is needed.*found none \(set PYTHON to its path\)",
+        r"Python 3\.11, 3\.12 or 3\.13 is needed.*found none; install .* set PYTHON to its path",
     ),
-    "an old python": (lambda f: f.add_python("3.9", too_old=1), f"{NO_WHEELS} 3.9 .*"),
+    "an old python": (lambda f: f.add_python("3.9", too_old=1), f"{NO_WHEELS} 3.9; .*"),
     "no venv": (lambda f: f.add_python(no_venv=1), "has no venv module.*"),
     "nothing can be made": (lambda f: f.touch(".cache"), "no write permission in .*/a folder, .*"),
     "line break at the end": (lambda f: rename(f, "ends\n"), ".*line break.*"),
@@ -178,7 +178,7 @@ def test_no_network(folder):
         PIP_RETRIES="0",
     )
     assert "making .venv" in announcement
-    assert "the packages cannot be downloaded: no network, or none for this machine? See " in line
+    assert "the packages cannot be downloaded; check the network, or the proxy. See" in line
     assert Path(line.partition("See ")[2]).is_file()
 
 
@@ -208,7 +208,7 @@ def test_packages_that_another_program_changed_are_noticed(change, folder):
         installed.rename(packages / "numpy-2.2.0.dist-info")
     announcement, why, *_ = folder.run()[1]
     assert "making .venv" in announcement
-    assert why == "reproduce: .venv holds other packages than those of requirements.lock"
+    assert why == "reproduce: the packages in .venv were not those of requirements.lock"
 
 
 def test_only_the_tests_add_their_tools_and_only_where_one_is_missing(folder):
@@ -251,7 +251,7 @@ def installing(folder: Folder) -> Iterator[tuple[Folder, subprocess.Popen[str]]]
 def test_the_second_of_two_set_ups_ends_at_once(installing):
     folder, first = installing
     (line,) = folder.refused()
-    assert line.startswith(f"pdrom: another run (process {first.pid}, making .venv) is at work")
+    assert line.startswith(f"pdrom: another run (process {first.pid}, making .venv) uses this")
     folder.path.joinpath("hold").unlink()
     first.communicate(timeout=60)
     assert first.returncode == 0
@@ -270,5 +270,5 @@ def test_a_set_up_that_a_signal_ends_says_so(installing, whole, number):
     assert folder.has("hold")
     assert first.returncode == 128 + number
     said = [line for line in errors.splitlines() if "packages" not in line]
-    assert said[-1] == f"pdrom: {ENDINGS[number]}; the same command goes on"
+    assert said[-1] == f"pdrom: {ENDINGS[number]}; run the same command again to continue"
     assert folder.calls == []

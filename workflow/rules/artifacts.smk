@@ -1,6 +1,6 @@
-# One rule for each artifact that src/pdrom declares, named as it; experiments, tables (<name>_table), figures
-# (figure_<name>) and the manuscript:
-#   ./reproduce results/figures/<name>.pdf   makes just that figure and what it needs
+# One rule for each artifact that src/study declares: experiments (<name>), tables (<name>_table), figures (figure_<name>)
+# and the manuscript. To make only one figure and what it needs:
+#   ./reproduce results/figures/<name>.pdf
 for made in rules_of(PLAN, CORES):
 
     rule:

@@ -1,1 +1,1 @@
-"""Artifacts (functions declared to make files of the study): declarations, paths and logs."""
+"""Declare artifacts (functions that make files of the study), with paths of files and logs."""

@@ -1,6 +1,6 @@
-"""Artifact: a function that makes files of the study, with its declared input and output files.
+"""Declare a function that makes files of the study (an artifact), with its inputs and outputs.
 
-A decorator declares it; parameters of the function are the names in ``reads`` and ``writes``::
+The names in ``reads`` and ``writes`` of a decorator are the parameters of the function::
 
     @experiment(
         "POD of {group} in {scene} ({basis})",
@@ -40,11 +40,11 @@ A = TypeVar("A", bound="Artifact")
 class Artifact:
     """A function that makes files of the study, with its input and output files.
 
-    A function has a parameter for each output file, or one, ``outputs``, for a mapping of names to
-    the paths of all output files: if these are many, or lie in configurable folders.
+    A function has a parameter for each output file. If these are many, or are in configurable
+    folders, it has a single parameter ``outputs``, which maps names to the paths of all of them.
 
     name : name of the function
-    title : message when a job starts; ``{scene}`` etc. stand for scene etc. of the job
+    title : message when a job starts; scene etc. of the job replace ``{scene}`` etc.
     reads : parameter of the function -> declared input (files or a setting)
     writes : parameter of the function -> kind of output file
     alone : True if the function measures times, so that no other job may run meanwhile
@@ -75,12 +75,12 @@ class Artifact:
 
     @property
     def files(self) -> dict[str, FileRead]:
-        """Mapping of parameters to declared inputs that are files (the others are settings)."""
+        """Mapping of parameters to declared inputs that are files; all others are settings."""
         reads = self.reads.items()
         return {name: read for name, read in reads if not isinstance(read, SettingRead)}
 
     def paths(self, inputs: Mapping[str, Any], edited: bool) -> list[str]:
-        """Paths among ``inputs`` of files edited by hand, or else of those that other jobs make."""
+        """Return paths of ``inputs`` that are ``edited`` by hand, or else those that jobs make."""
         reads = self.files.items()
         names = [name for name, read in reads if isinstance(read, EditedFiles) == edited]
         return [str(path) for name in names for path in listed(inputs[name])]
@@ -96,7 +96,7 @@ class Artifact:
         return self.function(*arguments, **named)
 
     def settings(self, sources: Sources, labels: Labels) -> dict[str, Any]:
-        """Map parameters to the job's valid settings; a missing one raises ConfigurationError."""
+        """Map parameters to the job's settings; ConfigurationError if a setting is missing."""
         reads = [(name, read) for name, read in self.reads.items() if isinstance(read, SettingRead)]
         values = {name: read.value(sources, labels) for name, read in reads}
         return {name: self.types[name].validate_python(value) for name, value in values.items()}
@@ -123,7 +123,7 @@ class Artifact:
 def recorded(
     made: Artifact, settings: Any, labels: Labels, code: str, content: str, digests: Iterable[str]
 ) -> AbstractContextManager[None]:
-    """Context in which files record a job as `make` gets it, with ``digests`` of what it reads."""
+    """Within this context, files record the job that makes them, with ``digests`` of its inputs."""
     inputs = hashlib.sha256("\n".join((content, *digests)).encode()).hexdigest()
     return made_by(made.rule, {**settings, "labels": dict(labels)}, code, inputs)
 
@@ -133,9 +133,9 @@ def make(
 ) -> None:
     """Run a job of the artifact at ``address``; its files record rule, settings, code and inputs.
 
-    Raises StorageError if an input is damaged or belongs to another result (`damaged_set_aside`),
-    and PdromError if a file that the job reads was edited since the plan of the run.
-    The other arguments are attributes of a `study.pipeline.plan.Job`.
+    Other arguments are attributes of a `study.pipeline.plan.Job`. Raises StorageError if an input
+    is damaged or was copied from another result (`damaged_set_aside`), and PdromError if a file
+    that the job reads was edited after the run was planned.
     """
     made: Artifact = resolve_name(address)
     digests = map(digest_told, made.paths(job["inputs"], edited=False))
@@ -160,7 +160,7 @@ def declare(made: A, *parameters: str) -> A:
 def declared_in(package: str, kind: type[A]) -> dict[str, A]:
     """Return all artifacts of the class ``kind`` in the modules of a package, sorted by name."""
     found = {}
-    # to save time, modules that import nothing from the module of ``kind`` are not imported
+    # to save time, do not import modules that import nothing from the module of ``kind``
     above, _, own = kind.__module__.rpartition(".")
     needed = f"\nfrom {kind.__module__} import ", f"\nfrom {above} import {own}"
     for name, (_, text) in plan().items():

@@ -1,4 +1,4 @@
-"""Log file of a job, its time and memory, and the message that the user sees when the job fails.
+"""Write the log of a job, with its time and memory, and the message that users see if it fails.
 
 Snakemake's ``benchmark:`` measures only every 30 s, which is longer than most jobs take.
 """
@@ -32,8 +32,8 @@ def job_log(path: str) -> Iterator[logging.Logger]:
     """Write log messages to ``path`` while a job runs; limit libraries to one thread meanwhile.
 
     More threads would change the order of sums. A `PdromError` ends the job with one line on
-    stderr; any other exception also leaves its traceback in the log. The last line of the log has
-    time and memory of a job that succeeds, or Python's stack trace if a signal ends the job.
+    stderr; for any other exception, the log also gets the traceback. The log ends with time and
+    memory if the job succeeds, or with Python's stack trace if a signal ends the job.
     Damaged results that the job reads are renamed, so that the next run makes them again.
     """
     start = time.monotonic()
@@ -83,9 +83,9 @@ def warnings_to(stream: TextIO | None, form: str = "pdrom: warning: %(message)s"
 
 
 class Usage(NamedTuple):
-    """Seconds of a job, of processor time (with processes that it started), and memory in MB.
+    """Seconds that a job took, its processor seconds (with child processes), and memory in MB.
 
-    The memory is the largest of the job or of one such process, with libraries, which jobs share.
+    The memory is the peak of the job or of one child, including libraries, which jobs share.
     """
 
     wall: float
@@ -100,7 +100,7 @@ class Usage(NamedTuple):
 
 
 def usage_since(start: float) -> Usage:
-    """Return wall time since ``start`` (s, monotonic clock), this process's time and memory."""
+    """Return the time since ``start`` (s, monotonic clock), and this process's time and memory."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return Usage(
         wall=time.monotonic() - start,

@@ -1,7 +1,7 @@
-"""Layout of a results folder: the only module that defines paths of results.
+"""Define all paths in a results folder; no other module defines paths of results.
 
 A `Place` is a kind of file. Its path has wildcards for scene, group, method ..., whose values are
-called labels. Each configuration has its own results folder, which the pipeline chooses.
+called labels. The pipeline chooses a results folder for each configuration.
 """
 
 import re
@@ -31,11 +31,11 @@ class Place:
     pattern: str
 
     def at(self, results: str, **labels: str) -> str:
-        """Path of the file in the folder ``results`` for scene, group ... in ``labels``."""
+        """Return the path of the file in the folder ``results`` for scene etc. in ``labels``."""
         return f"{results}/{self.pattern.format(**labels)}"
 
     def where(self, **labels: str) -> "Place":
-        """Return the kind of file whose pattern has the values ``labels`` in place of wildcards."""
+        """Return this kind of file with the values ``labels`` in place of their wildcards."""
         pattern = self.pattern
         for label, value in labels.items():
             pattern = pattern.replace(f"{{{label}}}", value)
@@ -50,11 +50,11 @@ class Place:
         """Return ``path`` as a `File`; StorageError if the path does not fit the pattern."""
         found = self._expression.search(path)
         if found is None:
-            raise StorageError(f"{path}: no file of the kind '{self.pattern}'")
+            raise StorageError(f"{path}: the path does not fit '{self.pattern}'")
         return File(path, found.groupdict())
 
     def paths(self, sources: Any, labels: Mapping[str, str]) -> str:
-        """Path, found by the plan ``sources``, of this kind of file for a job's ``labels``."""
+        """Return the path of this kind of file for a job's ``labels``; ``sources`` is the plan."""
         return str(sources.file(self, labels))
 
     def content(self, paths: Any) -> "File":
@@ -135,7 +135,7 @@ LIVE_PAGE = Place("article/live.html")
 def labels_in(
     path: str, results: str, places: Iterable[Place]
 ) -> Iterator[tuple[Place, dict[str, str]]]:
-    """Yield each of ``places`` whose pattern ``path`` fits, and labels, as {"scene": "bar140"}."""
+    """Yield each of ``places`` whose pattern fits ``path``, with labels as {"scene": "bar140"}."""
     for place in places:
         if path.startswith(f"{results}/{place.pattern.partition('{')[0]}"):
             with suppress(StorageError):

@@ -1,6 +1,6 @@
-"""Import the code that a run has planned, whatever happens to its files while the run is at work.
+"""Import the code with which a run was planned, even if its files are edited during the run.
 
-A run keeps the texts that its plan has read in a file, and its jobs import modules from there
+A run stores the code that its plan has read in a file, from which its jobs import all modules
 (docs/decisions/0001-code-fingerprints.md).
 
 ``python -m study.artifact.planned MODULE ARGUMENTS`` runs a module in a new process of a job.
@@ -22,7 +22,7 @@ from typing import Any
 
 PACKAGES = ("pdrom", "study")
 SCRIPT = "workflow/scripts/artifact.py"
-# File in which a run keeps its plan; environment variable with its path, for the jobs of the run.
+# File in which a run stores its plan; environment variable with the file's path, for jobs.
 PLAN, KEPT = Path(".snakemake/plan.json"), "PDROM_PLAN"
 
 
@@ -33,7 +33,7 @@ def kept() -> tuple[dict[str, tuple[str, str]], dict[str, int]]:
         return tuple(json.loads(Path(place).read_bytes()))
     root, found = Path(__file__).resolve().parents[2], {}
     for path in sorted(path for name in PACKAGES for path in (root / name).rglob("*.py")):
-        if path.is_file():  # an editor's lock file may be a link that leads nowhere
+        if path.is_file():  # an editor's lock file may be a broken link
             name = ".".join(path.relative_to(root).with_suffix("").parts)
             found[name.removesuffix(".__init__")] = (str(path), path.read_bytes().decode())
     return found, {}
@@ -45,25 +45,25 @@ def plan() -> dict[str, tuple[str, str]]:
 
 
 def changed(path: Path) -> int:
-    """Time of the last change of a file or its attributes, ns, which no program can set; or 0."""
+    """Return when a file or its attributes last changed, ns, which no program can set; or 0."""
     return path.stat().st_ctime_ns if path.is_file() else 0
 
 
 def noted(path: Path) -> Path:
-    """Return ``path`` of a file that the plan reads next; the plan notes when it was `changed`."""
+    """Return ``path``, a file that the plan is about to read, and note when it was `changed`."""
     kept()[1].setdefault(str(path), changed(path))
     return path
 
 
 def refused(paths: Iterable[str]) -> list[str]:
-    """Message for each of the files ``paths`` that was edited since the plan of the run."""
+    """Return a message for each file in ``paths`` that was edited after the run was planned."""
     known = kept()[1] if KEPT in os.environ else {}
     edited = [p for p in map(Path, paths) if known and known[str(p)] != changed(p)]
-    return [f"{p}: edited while the run was at work; run the same command again" for p in edited]
+    return [f"{p}: edited during the run; run the same command again" for p in edited]
 
 
 class _Planned(SourceFileLoader):
-    """Finder and loader of planned modules; compiled code is kept by their text, not by date."""
+    """Finder and loader of planned modules; stores compiled code by their text, not their date."""
 
     @classmethod
     def find_spec(cls, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
@@ -90,7 +90,7 @@ class _Planned(SourceFileLoader):
 
 
 def import_planned() -> None:
-    """Import modules as planned from now on, if a run has started this process."""
+    """If a run has started this process, import modules as planned from now on."""
     if KEPT in os.environ and _Planned not in sys.meta_path:
         sys.meta_path.insert(0, _Planned)
 

@@ -1,4 +1,4 @@
-"""Declarations of the inputs of artifacts: files and settings.
+"""Declare the inputs of artifacts: files and settings.
 
 A declaration contains no path: it names a kind of file, a table, or a key of the configuration. The
 plan of the study (``sources``) finds paths or value for the scene, group ... (``labels``) of a job.
@@ -24,15 +24,15 @@ def listed(paths: Paths) -> list[str]:
     return [paths] if isinstance(paths, str) else list(paths)
 
 
-# Path of a file in git with the rows of table {} that the long study config/extended.yaml computed.
+# File in git with those rows of table {} that the long study config/extended.yaml has computed.
 RECORD = "config/reference/recorded/{}.csv"
-# A `study.pipeline.plan.Plan`: finds paths and settings for the scene, group ... of a job.
+# A `study.pipeline.plan.Plan`, which finds paths and settings for the scene, group ... of a job.
 Sources = Any
 
 
 @dataclass(frozen=True)
 class Every:
-    """All files of the study whose paths fit ``place`` and the job's labels (scene, group ...)."""
+    """All files of the study that fit ``place`` and the job's labels (scene, group ...)."""
 
     place: Place
 
@@ -68,7 +68,7 @@ class TableOf:
 
 
 class EditedFiles:
-    """Base class for files edited by hand: a job reruns if content changed, whatever the date."""
+    """Base class for files edited by hand; a job reruns if their content, not the date, changes."""
 
     def content(self, paths: Any) -> Any:
         return Path(paths) if isinstance(paths, str) else [Path(path) for path in paths]
@@ -76,7 +76,7 @@ class EditedFiles:
 
 @dataclass(frozen=True)
 class ProjectFile(EditedFiles):
-    """A file edited by hand, or a tuple of several, given by the path in the project."""
+    """A file edited by hand, or a tuple of several files, given by paths in the project."""
 
     path: str | tuple[str, ...]
 
@@ -125,7 +125,7 @@ class Settings:
         return self.model.model_validate({key: sources.value(key, labels) for key in fields})
 
 
-# An input declared as a `Place` (kind of file) is the file of this kind for the job's scene etc.
+# An input declared as a `Place` (kind of file) is the file of this kind for the job's labels.
 FileRead = Every | TableOf | ProjectFile | Recorded | SourcesOf | Place
 SettingRead = Setting | Settings
 Read = FileRead | SettingRead

@@ -1,7 +1,7 @@
-r"""Typesetting of texts that a user wrote, and of titles and captions in mark-up.
+r"""Typeset texts that a user wrote, and titles and captions in mark-up.
 
-The manuscript is typeset by pdfTeX with T1 fonts: Latin letters stand as they are, Greek letters
-and signs become formulas. Figures are drawn with DejaVu Sans, which has all of them.
+pdfTeX typesets the manuscript with T1 fonts, which have Latin letters; Greek letters and signs
+become formulas. Figures use DejaVu Sans, which has all these characters.
 
 In the mark-up, a name between backticks is set in typewriter, ``$r \le 20$`` is mathematics, and
 ``{key}`` stands for the value of a setting of the configuration.
@@ -41,7 +41,7 @@ _KEY = re.compile(r"\{([a-z_.]+)\}")
 
 
 def escape(text: str) -> str:
-    """TeX code of a plain ``text``; PaperError for a character that cannot be typeset."""
+    """Return TeX code of a plain ``text``; PaperError if a character cannot be typeset."""
     pieces = []
     for character in unicodedata.normalize("NFC", text):
         piece = _typeset(character)
@@ -54,7 +54,7 @@ def escape(text: str) -> str:
 
 
 def require_typeset(data: Any, place: str) -> None:
-    """Raise ConfigurationError, with its key below ``place``, if TeX lacks a sign of the data."""
+    """Raise ConfigurationError, with the key below ``place``, if TeX cannot typeset a text."""
     if isinstance(data, dict | list):
         for key, value in data.items() if isinstance(data, dict) else enumerate(data):
             require_typeset(value, f"{place}.{key}")
@@ -69,7 +69,7 @@ def require_typeset(data: Any, place: str) -> None:
 
 
 def replaced(text: str) -> str:
-    """Return ``text``, a question mark in place of each character that cannot be typeset."""
+    """Return ``text`` with question marks in place of characters that cannot be typeset."""
     characters = unicodedata.normalize("NFC", text)
     return "".join("?" if _typeset(character) is None else character for character in characters)
 
@@ -79,7 +79,7 @@ def _typeset(character: str) -> str | None:
         return _SPECIAL[character]
     if " " <= character <= "~" or character in _PUNCTUATION:
         return character
-    # a letter that T1 fonts have: Latin-1, Latin Extended-A, or a Romanian letter
+    # T1 fonts have letters of Latin-1 and Latin Extended-A, and Romanian letters
     latin = "\u00c0" <= character <= "\u017e" or "\u0218" <= character <= "\u021b"
     if latin and character.isalpha() and character not in _NO_LETTERS:
         return character
@@ -90,7 +90,7 @@ def _typeset(character: str) -> str | None:
 
 
 def _greek(character: str) -> str | None:
-    """TeX command of a Greek letter without accents; None for any other ``character``."""
+    """Return the TeX command of a Greek letter without accents; None for other characters."""
     words = unicodedata.name(character, "").lower().replace("lamda", "lambda").split()
     if len(words) != 4 or words[::2] != ["greek", "letter"] or words[3] not in _GREEK.split():
         return None

@@ -1,1 +1,1 @@
-"""Experiments: functions that run models and write files of results, a module per subject."""
+"""Run models and write files of results; each module has the experiments on one subject."""

@@ -1,7 +1,7 @@
-"""Error budget of a reduced model: what its columns, closure, sampling and iterations add.
+"""Measure how much each simplification adds to the error of a reduced model (its error budget).
 
-A model is run on test trajectories with one simplification after the other, and compared with the
-converged runs.
+The simplifications are the subspace (span), its equations of motion (closure), the sampled elements
+and the few iterations. They are added one by one in runs that are compared with converged runs.
 """
 
 import logging
@@ -40,9 +40,9 @@ COLUMNS = [
 class Budget(ConfigModel):
     """Section ``error_budget``: one model of each scene, trained on its converged training run.
 
-    modes, tolerance : numbers of POD modes, and tolerance of the sampled elements
+    modes, tolerance : number of POD modes, and tolerance of the sampled elements
     iterations : local/global iterations of a frame in part "run"
-    skinning : scenes with a second model, which has as many skinning columns beside the modes
+    skinning : scenes with a second model, which has as many skinning columns as POD modes
     """
 
     modes: kit.Modes = 40
@@ -70,7 +70,7 @@ def error_budget(
 ) -> None:  # fmt: skip
     """Run every test trajectory of a scene with each simplification, until its horizon.
 
-    Without a converged run there are no rows.
+    A trajectory that did not converge has no rows; without a converged training run, none has.
     """
     runs = {run["run"]: converged_positions(run) for run in converged}
     rows, training = [], runs.pop(kit.TRAIN)
@@ -100,10 +100,10 @@ def error_budget(
 
 
 def _parts(model: SubspaceModel, yardstick: Yardstick, few: int) -> Iterator[Part]:
-    """Yield name of a part of the budget, and the positions (F + 1, N, 3) m that it reaches.
+    """Yield the name of each part of the budget with its positions (F + 1, N, 3) m.
 
-    They are the best approximation of the reference in the subspace, runs whose frames converge,
-    with all elements and with the sampled ones, and a run of ``few`` iterations.
+    The parts are the best approximation of the reference in the subspace, converged runs with all
+    elements and with the sampled elements, and a run with ``few`` iterations.
     """
     scene, columns = yardstick.scene, model.columns
     yield SPAN, columns.B @ (projector(columns, scene.masses) @ yardstick.reference)
@@ -113,7 +113,7 @@ def _parts(model: SubspaceModel, yardstick: Yardstick, few: int) -> Iterator[Par
 
 
 def _run(model: SubspaceModel, scene: Scene, iterations: int | None = None) -> np.ndarray:
-    """Run with so many local/global iterations, or until each frame converges; the positions."""
+    """Return the positions of a run with local/global ``iterations``; None: until convergence."""
     asked = scene.iterated(iterations or ALL, scene.config.anderson_window)
     loop, start = model.loop(asked, newton=iterations is None)
     output = model.output(float)

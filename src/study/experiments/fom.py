@@ -1,4 +1,4 @@
-"""Mesh of a scene, its full-order runs, and the snapshots of each reduced group."""
+"""Make the mesh of a scene, its full-order runs, and the snapshots of each reduced group."""
 
 from pathlib import Path
 
@@ -34,10 +34,10 @@ def mesh(sources: list[Path], config: MeshConfig, out: File) -> None:
     writes={"train": TRAIN, "heldout": HELDOUT, "kick": KICK, "stiffness": STIFFNESS},
 )
 def fom(mesh: File, config: SceneConfig, **runs: File) -> None:
-    """Simulate the training motion and the held-out motions of a scene, each into one of ``runs``.
+    """Simulate the training trajectory and the test trajectories of a scene, one for each file.
 
-    The training run and, in odd frames only, the first held-out run also store projections for the
-    snapshots. All other runs store positions only.
+    The training run and, in odd frames only, the first test run (``heldout``) also store
+    projections for the snapshots. All other runs store positions only.
     """
     frames, plans = config.frames, config.reduce
     wanted = {

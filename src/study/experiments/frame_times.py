@@ -1,6 +1,6 @@
-"""Frame times, in several processes, of full-order runs and of reductions.
+"""Time frames of full-order runs and of reduced runs in several processes.
 
-Every process times all runs, in a random order of its own. As a control, the full-order run of each
+Every process times all runs, in another random order. As a control, the full-order run of each
 scene is timed twice: speed-ups as small as the difference between these two times mean nothing.
 """
 
@@ -58,7 +58,7 @@ class ProjectionCase(OfScene):
 class FrameTimes(Processes):
     """Section ``frame_times`` of the configuration: reductions whose speed-up the manuscript cites.
 
-    Also timed: the full-order run of each scene, all models of scenes in section ``online``.
+    The full-order run of each scene and all models of section ``online`` are timed, too.
     """
 
     subspaces: tuple[SubspaceCase, ...] = ()
@@ -86,7 +86,7 @@ Models = list[tuple[dict[str, Any], Model]]
 
 
 def variants(scene: Scene, models: Models, frames: int) -> Iterator[Variant]:
-    """Yield what is timed of ``scene``: full order, the same as a control, labelled ``models``."""
+    """Yield the runs to time: full-order run, its repetition as a control, labelled ``models``."""
     config, frames = scene.config, min(frames, scene.config.frames)
     common = {"scene": config.name, "vertices": scene.mesh.vertices, "frames": config.frames}
     for role in (FULL, CONTROL):
@@ -112,7 +112,7 @@ def variants(scene: Scene, models: Models, frames: int) -> Iterator[Variant]:
     alone=True,
 )
 def frame_times(settings: Options, times: File, seconds: File, **files: list[File]) -> None:
-    """Run the timing processes one by one; write times of frames, and of selecting the samples."""
+    """Time frames in one process after the other, and the selection of samples; write all times."""
     asked = settings.frame_times
     meshes = zip(settings.timed_scenes, files["meshes"], strict=True)
     scenes = {own.scene: Scene.build(own.config, load_mesh(mesh.path)) for own, mesh in meshes}
@@ -131,7 +131,7 @@ def frame_times(settings: Options, times: File, seconds: File, **files: list[Fil
     for case, file in zip(settings.subspace_cases, files["subspaces"], strict=True):
         wanted, held = case.model_dump(exclude={"scene"}), load_models(file.path)
         models[case.scene] += [each for each in held if each[0] == wanted]
-    # time all models in the file of a large scene, also if ``timed_scenes`` lists this scene, too
+    # time all models in the file of a large scene, even if ``timed_scenes`` also lists the scene
     for named, file in zip(settings.large_scenes, files["large"], strict=True):
         if named.scene not in scenes:
             scenes[named.scene] = Scene.build(named.config, named.config.mesh.build(Path()))

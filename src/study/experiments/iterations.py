@@ -1,6 +1,6 @@
-"""Error of runs with K local/global iterations per frame, against the limit K -> infinity.
+"""Compare runs with K local/global iterations per frame with the limit K -> infinity.
 
-The runs are on the scene's mesh and on coarser ones.
+The runs are on the scene's mesh and on coarser meshes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,16 +31,16 @@ COLUMNS = [
     "scene", "iterations", "window", "vertices", "frames", "error_converged",
     "deformation_converged", "mesh_error",
 ]  # fmt: skip
-NAMES = {PLAIN: kit.FOM, ANDERSON: kit.ANDERSON}  # of methods, in tables of the study
-COARSE, MOST = 1e-6, 4000  # tolerance of converged coarse runs; evaluations of a frame
+NAMES = {PLAIN: kit.FOM, ANDERSON: kit.ANDERSON}  # names of methods in tables of the study
+COARSE, MOST = 1e-6, 4000  # converged runs on coarser meshes: tolerance, most evaluations a frame
 
 
 class IterationCounts(ConfigModel):
-    """Section ``iterations``: full-order settings beside that of the scene.
+    """Section ``iterations``: full-order settings other than that of the scene.
 
-    counts, coarser_counts : local/global iterations of a frame, on the own and on coarser meshes
+    counts, coarser_counts : local/global iterations of a frame, on the scene's and coarser meshes
     anderson_window : numbers of iterations above 2 are also run with this window, unless it is 0
-    coarser : parts of the cells along a side that the coarser meshes have
+    coarser : numbers of cells along a side of coarser meshes, relative to the scene's mesh
     """
 
     counts: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = (1, 2, 5, 10, 20, 40)
@@ -50,7 +50,7 @@ class IterationCounts(ConfigModel):
 
 
 @kit.experiment(
-    "Accuracy of {scene} against the number of iterations",
+    "Errors of {scene} for several numbers of iterations",
     reads={
         "mesh": paths.MESH,
         "converged": paths.CONVERGED.where(run="train"),
@@ -67,7 +67,7 @@ def iterations(
 ) -> None:  # fmt: skip
     """Run a scene with every setting until its horizon; write errors against the converged run.
 
-    They are empty without such a run. The own setting has the error of the mesh, too.
+    The errors are empty if no run converged. The scene's setting also gets the error of the mesh.
     """
     scene = kit.scene_of(config, files["mesh"])
     frames = max(1, horizon.frames(files["sensitivity"]))
@@ -93,7 +93,7 @@ def iterations(
 
 
 def settings(scene: Scene, asked: IterationCounts) -> Iterator[Setting]:
-    """Yield the full order of ``scene`` with all numbers of iterations, on all meshes."""
+    """Yield full-order settings of ``scene`` with all numbers of iterations, on all meshes."""
     coarse = grids(scene, asked.coarser)
     counts = sorted({*asked.counts, scene.config.count}), sorted(asked.coarser_counts)
     places: tuple[Sequence[Coarser | None], ...] = ((None,), coarse)
@@ -105,6 +105,6 @@ def settings(scene: Scene, asked: IterationCounts) -> Iterator[Setting]:
 
 
 def accelerated(counts: list[int], window: int) -> list[tuple[int, int]]:
-    """Pairs (iterations, Anderson window): all ``counts`` with 0, those over 2 with ``window``."""
+    """Return pairs (iterations, Anderson window): ``counts`` with 0, those above 2 with window."""
     plain = [(count, 0) for count in counts]
     return plain + [(count, window) for count in counts if window and count > 2]

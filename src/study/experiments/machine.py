@@ -1,8 +1,8 @@
-"""Record of the machine: its speed in three units of time, and the versions of libraries.
+"""Record the speed of the machine in three units of time, and the versions of libraries.
 
 The units are the processor times, on one thread, of 1e9 dependent steps x <- a x + b (scalar), of
 1e9 sums and products in independent vectors of four doubles (vector), and of reading 1e9 bytes of
-an array of 256 MiB (memory), each the minimum over some repeats of fewer steps.
+an array of 256 MiB (memory). Each is extrapolated from the fastest of several shorter loops.
 ``./reproduce run python -m study.experiments.machine`` measures and prints them in a few seconds.
 """
 
@@ -50,15 +50,15 @@ class Record(this.Machine):
     "Record of the machine and the library versions", reads={}, writes={"out": MACHINE}, alone=True
 )
 def machine(out: File) -> None:
-    """Write to ``out`` the times of benchmark loops, and data about machine and libraries."""
+    """Write times of the benchmark loops and data about machine and libraries to ``out``."""
     record = Record(**this.machine().model_dump(), units=units())
     write_text(record.model_dump_json(indent=2) + "\n", out.path)
 
 
 def units() -> Units:
-    """Time the three benchmark loops (`Units`) on this machine, each as the least of repeats."""
+    """Time the three benchmark loops (`Units`) on this machine; each time is a minimum."""
     numbers = np.ones(MEMORY_BYTES // 8)
-    # (billions of operations or bytes, function that does 1/``share`` of them; `_read` does all)
+    # (billions of operations or bytes, function that does 1/``share`` of them; `_read` reads all)
     trials: list[tuple[float, Callable[[int], object]]] = [
         (1e-9 * SCALAR_STEPS, lambda share: _chain(SCALAR_STEPS // share)),
         (
@@ -107,7 +107,7 @@ def _products(numbers, times):
 
 @compiled(nogil=True)
 def _read(numbers):
-    """Sum of the ``numbers``, whose count is a multiple of 32."""
+    """Return the sum of the ``numbers``, whose count is a multiple of 32."""
     a, b, c, d = constant(0.0), constant(0.0), constant(0.0), constant(0.0)
     e, f, g, h = constant(0.0), constant(0.0), constant(0.0), constant(0.0)
     for i in range(0, len(numbers), AT_ONCE * WIDTH):

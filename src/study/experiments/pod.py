@@ -1,4 +1,4 @@
-"""POD basis of a constraint group's projections, computed from snapshots."""
+"""Compute the POD basis of a constraint group's projections from snapshots."""
 
 import logging
 

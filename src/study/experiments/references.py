@@ -1,7 +1,7 @@
-"""Converged full-order runs of a scene: the reference of all errors that do not ask for another.
+"""Compute converged full-order runs of a scene, the default reference of errors.
 
 A frame of a converged run ends when one more local/global iteration would move no vertex by more
-than a tolerance. How far such a run is from the exact step, a second solve tells.
+than a tolerance. A second run with a smaller tolerance estimates the error of the converged run.
 """
 
 import logging
@@ -31,14 +31,14 @@ COLUMNS = [
     "replay_error", "replay_deformation_error", "deformation", "affine", "playback_all",
     "playback_error", "playback_deformation_error",
 ]  # fmt: skip
-FINER = 1e-2  # tolerance of the second solve over that of the first
-AFTER = 1e-4  # tolerance of frames after the horizon, over which no error is taken
+FINER = 1e-2  # tolerance of the second run, relative to that of the first run
+AFTER = 1e-4  # tolerance of frames after the horizon, in which no error is measured
 
 
 class Reference(ConfigModel):
-    """Section ``reference``: when a frame of the converged runs ends.
+    """Section ``reference``: conditions that end a frame of the converged runs.
 
-    tolerance : largest move of a vertex by one more iteration, over the mesh's longest side
+    tolerance : largest move of a vertex by one more iteration, relative to the longest side
     limit : largest number of evaluations of a frame's objective
     """
 
@@ -68,11 +68,11 @@ def references(
     mesh: File, sensitivity: File, full_order: list[File], config: SceneConfig,
     asked: Reference, horizon: kit.Horizon, out: File, **runs: File,
 ) -> None:  # fmt: skip
-    """Run all motions of a scene to convergence, each into one of ``runs``; errors go to ``out``.
+    """Write converged runs of all trajectories of a scene to ``runs``, and errors to ``out``.
 
-    The error of such a run is its difference, before the horizon, from a second one with a
-    tolerance `FINER`, which on sheets starts every frame from another guess, as several minima may
-    exist. A run with a frame that did not converge has no positions.
+    The error of a converged run is its difference, before the horizon, from a second run with the
+    tolerance times `FINER`. On sheets, which may have several minima, the second run starts every
+    frame from another guess. If a frame does not converge, the file has no positions.
     """
     rows: list[dict[str, object]] = []
     training: tuple[np.ndarray, np.ndarray | None] | None = None
@@ -105,15 +105,15 @@ def references(
 def _errors(
     name: str, yardstick: Yardstick, run: np.ndarray | None, end: int
 ) -> dict[str, float | None]:
-    """Position and deformation error of ``run`` before frame ``end``, by column name."""
+    """Return the position and deformation error of ``run`` before frame ``end``, by column."""
     found = (None, None) if run is None else yardstick.errors(run, end)
     return dict(zip((f"{name}_error", f"{name}_deformation_error"), found, strict=True))
 
 
 def _deformation(converged: Yardstick) -> dict[str, float | None]:
-    """Return what the best rigid and affine motions of the rest shape leave, by column name.
+    """Return distances of the run from the best rigid and affine maps of the rest shape, by column.
 
-    Both are norms over all frames, relative to that of the displacement; None if nothing moves.
+    They are norms over all frames, relative to that of the displacement; None if nothing moves.
     """
     scene, run = converged.scene, converged.reference
     root = np.sqrt(scene.masses / scene.masses.mean())[:, None]
@@ -128,7 +128,7 @@ def _deformation(converged: Yardstick) -> dict[str, float | None]:
 def _run(
     scene: Scene, asked: Reference, end: int, frames: int, again: bool = False
 ) -> tuple[np.ndarray | None, float]:
-    """Return positions of ``frames`` frames, None without convergence, and mean evaluations."""
+    """Return positions (None if a frame does not converge) and mean evaluations of a frame."""
     tolerance, sheet = asked.tolerance * (FINER if again else 1.0), not len(scene.mesh.tetrahedra)
     loop = ConvergedStepper(scene, scene.system, tolerance, asked.limit, from_last=again and sheet)
     state = scene.initial_state()
@@ -143,13 +143,13 @@ def _run(
 
 
 def converged_positions(run: File, frames: int | None = None) -> np.ndarray | None:
-    """Positions (F + 1, N, 3) m of a converged run, or of its first frames; None without them."""
+    """Read positions (F + 1, N, 3) m of a converged run, or of its first frames; None if absent."""
     with open_hdf5(run.path) as file:
         stored = file.get("positions")
         return None if stored is None else stored[: None if frames is None else frames + 1]
 
 
 def run_error(run: np.ndarray, reference: np.ndarray) -> float | None:
-    """Relative error of ``run`` (F + 1, N, 3) m against ``reference``; None if this never moves."""
+    """Return the relative error of ``run`` (F + 1, N, 3) m; None if ``reference`` never moves."""
     difference = np.linalg.norm((run - reference)[1:].reshape(len(run) - 1, -1), axis=1)
     return trajectory_error(difference, displacement_norms(reference))

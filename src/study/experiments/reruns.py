@@ -1,4 +1,4 @@
-"""Samples of a constraint group by one method, and runs reduced by them, at all basis sizes r."""
+"""Sample the projections of a constraint group and run the reduced scenes, at all basis sizes r."""
 
 import logging
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ TEST_FRAMES = 20  # of a test trajectory, the positions of frames 0, 20, 40, ...
 
 
 def sweep(largest: int) -> set[int]:
-    """Basis sizes of reconstruction errors: all to `DENSE`, then every `STEP`-th; ``largest``."""
+    """Return sizes for reconstruction errors: all to `DENSE`, then every `STEP`-th; ``largest``."""
     coarse = range(DENSE + STEP, largest + 1, STEP)
     return {*range(1, min(DENSE, largest) + 1), *coarse, largest} - {0}
 
@@ -54,7 +54,7 @@ class Options(ConfigModel):
 
 
 @kit.experiment(
-    "Sampling and reruns of {scene}, {group} by {method}",
+    "Sampling and reduced runs of {scene}: {group} by {method}",
     reads={
         "mesh": paths.MESH,
         "motions": Every(paths.FULL_ORDER),
@@ -72,7 +72,7 @@ class Options(ConfigModel):
     },
 )
 def reruns(motions: list[File], converged: list[File], settings: Options, **files: File) -> None:
-    """Sample a constraint group; run training and held-out motions with it reduced to every size r.
+    """Sample a constraint group; run training and test trajectories with each reduced size r.
 
     One job does the sampling and the runs, as sampling takes less time than starting a process.
     """
@@ -100,10 +100,10 @@ def _runs(
     yardstick: Yardstick, labels: Row, sampled: dict[int, Reduction | None], rank: int,
     file: h5py.Group,
 ) -> Iterator[Row]:  # fmt: skip
-    """Run a motion with every reduction, store the runs in ``file``, and yield their table rows.
+    """Run a trajectory with every reduction, store the runs in ``file``, and yield table rows.
 
-    A size r above the rank is not run: its row has no results, its group is ``marked``. The
-    positions of all frames are stored for training only, whose ``file`` is the root group.
+    A size r above the rank is not run: its row has no results, its HDF5 group is ``marked``. Only
+    training runs, whose ``file`` is the root group, store the positions of all frames.
     """
     for r, reduction in sampled.items():
         store, row, outcome = file.create_group(f"r{r:04d}"), labels | {"r": r, "frames": 0}, None
@@ -122,7 +122,7 @@ def _sample(
 ) -> dict[int, Reduction | None]:
     """Select samples of ``basis`` at all sizes r; write them, and errors of reconstructed ``data``.
 
-    Return the reductions of the sizes in ``settings``, None for those above the rank. The first
+    Returns the reductions of the sizes in ``settings``, None for sizes above the rank. The first
     columns of the table are the labels (scene, group, method) of the file ``sampling``.
     """
     labels = sampling.labels
@@ -137,7 +137,7 @@ def _sample(
             sizes = (reduction.gain, reduction.rows_sampled, len(reduction.elements))
             for split in SPLITS:
                 p = getattr(data, split)
-                # the norm of the rounding errors of n snapshots grows like sqrt(n)
+                # the norm of the rounding errors of n snapshots is proportional to sqrt(n)
                 roundoff = data.roundoff * np.sqrt(len(p) / len(data.train))
                 apart = relative_errors(p, reduction.reconstruct(p), roundoff)
                 own = (*labels.values(), r, split, *apart, *sizes)
@@ -145,6 +145,6 @@ def _sample(
     beyond = [r for r in asked if r > basis.rank]
     rows += [{**labels, "r": r, "split": split} for r in beyond for split in SPLITS]
     if beyond:
-        log.warning("r = %s exceeds the numerical rank %d: marked rows", beyond, basis.rank)
+        log.warning("r = %s exceeds the numerical rank %d: not run", beyond, basis.rank)
     write_table(pd.DataFrame(rows, columns=ERROR_COLUMNS), errors.path)
     return {r: found.get(r) for r in asked}

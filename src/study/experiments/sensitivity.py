@@ -1,8 +1,9 @@
-"""Differences of full-order runs that should be equal (docs/study.md); forces of each effect.
+"""Measure how full-order runs change with small perturbations or other settings (docs/study.md).
 
-No reduced model can be expected to have a smaller error than the difference of a run whose start is
-moved by 1e-10 of the mesh's size. Other runs have another linear solver (another order of
-summation), number of iterations or time step, or lack an effect.
+A run whose initial positions are moved by 1e-10 of the mesh's size differs from the unchanged run.
+No reduced model can be expected to have a smaller error. Further runs have another linear solver
+(another order of summation), number of iterations or time step, or lack an effect; the forces of
+all effects are recorded.
 """
 
 from collections.abc import Iterator
@@ -27,14 +28,14 @@ from study.experiments.kit import base as kit
 EFFECTS = ["scene", "effect", "role", "frame", "force", "energy"]
 Row = tuple[str, str, int, float, float]
 COLUMNS = ["scene", "perturbation", "seed", "frame", "relative_difference"]
-OTHER_SOLVER = "splu"  # linear solver with another order of summation than the default solver
+OTHER_SOLVER = "splu"  # a linear solver that sums in another order than the default solver
 
 
 class PerturbedRuns(ConfigModel):
     """Settings of runs from randomly moved initial positions, for all ``seeds``.
 
-    ``perturbations`` are lengths of the displacement relative to the longest side of the mesh.
-    ``reference`` is the one that decides the horizon, and with which held-out motions are run.
+    ``perturbations`` are lengths of the displacement relative to the longest side of the mesh. The
+    perturbation ``reference`` defines the horizon; test trajectories are run with it only.
     """
 
     perturbations: tuple[kit.Tolerance, ...] = (1e-12, 1e-10, 1e-8)
@@ -68,12 +69,12 @@ def sensitivity(
     mesh: File, full_order: list[File], config: SceneConfig, chosen: PerturbedRuns, out: File,
     effects: File,
 ) -> None:  # fmt: skip
-    """Run a scene and its held-out motions from perturbed starts; also vary the scene's settings.
+    """Run training and test trajectories from perturbed starts; also vary the scene's settings.
 
     Differences from unchanged runs go to ``out``, forces and energies of effects to ``effects``.
     """
     parts: list[pd.DataFrame] = []
-    for run in full_order:  # each held-out motion has a horizon of its own
+    for run in full_order:  # each trajectory has another horizon
         motion, base = run["run"], kit.positions_of(run)
         scene = kit.scene_of(config, mesh, motion)
         if motion == kit.TRAIN:
@@ -85,7 +86,7 @@ def sensitivity(
 
 
 class _Watched:
-    """Wrapper of a contact that records by how much the contact moves vertices in a frame."""
+    """Wrapper of a contact that records how far the contact moves each vertex in a frame."""
 
     def __init__(self, contact: Contact) -> None:
         self.name, self._contact = contact.name, contact
@@ -99,15 +100,15 @@ class _Watched:
 
 
 def contributions(scene: Scene) -> pd.DataFrame:
-    """Table: norm of the force (N) and energy (J) of each effect in each frame of ``scene``.
+    """Tabulate the norm of the force (N) and the energy (J) of each effect in each frame.
 
-    Effects with the same name count as one. A frame of h seconds leads from positions q and
-    velocities v to positions q'; M are the masses (other symbols: docs/study.md). The force on free
-    vertices is S^T W (p - S q') for a constraint group, M a for an acceleration a, and M d / h^2
-    for a contact that moves vertices by d. Pins or handles exert M (q' - q - h v) / h^2, less the
+    Effects with the same name are added. A frame of h seconds leads from positions q and velocities
+    v to positions q'; M are the masses (other symbols: docs/study.md). The force on free vertices
+    is S^T W (p - S q') for a constraint group, M a for an acceleration a, and M d / h^2 for a
+    contact that moves vertices by d. Pins and handles exert M (q' - q - h v) / h^2, minus the
     forces of groups and accelerations, on the vertices that they hold; initial velocities v exert
     M v / h. The energy is that of the constraints, the potential of a force, or the kinetic energy
-    that initial velocities add; it is nan for other effects.
+    of initial velocities; it is nan for other effects.
     """
     watched = [_Watched(contact) for contact in scene.contacts]
     space = VertexSpace(scene.system, scene.forces, scene.boundaries, contacts=watched)  # type: ignore[arg-type]
@@ -171,11 +172,11 @@ def _frame(
 
 
 def relative_difference(other: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """Relative difference (F,) of trajectory ``other`` from ``base``, (F + 1, N, 3) each, by frame.
+    """Return the relative difference (F,) of trajectory ``other`` from ``base`` in each frame.
 
-    It is the norm of the difference in frame f, || Q'_f - Q_f ||_F, divided by the root mean square
-    of || Q_f - Q_0 ||_F of ``base`` over all frames. A common denominator avoids division by almost
-    zero in slow first frames.
+    Both have the shape (F + 1, N, 3). The difference is || Q'_f - Q_f ||_F in frame f, divided by
+    the root mean square of || Q_f - Q_0 ||_F of ``base`` over all frames. A common denominator
+    avoids division by almost zero in slow first frames.
     """
     difference = (other - base)[1:].reshape(len(base) - 1, -1)
     return np.linalg.norm(difference, axis=1) / mean_motion(base)
@@ -197,9 +198,9 @@ def perturbed(
 def sensitivities(
     scene: Scene, base: np.ndarray, perturbations: tuple[float, ...], seeds: tuple[int, ...]
 ) -> pd.DataFrame:
-    """Table by frame: relative differences of perturbed and changed runs from the run of ``scene``.
+    """Tabulate by frame the relative differences of perturbed and changed runs from ``base``.
 
-    Positions of this run are ``base`` (F + 1, N, 3) m.
+    ``base`` (F + 1, N, 3) m are the positions in the run of ``scene``.
 
     The changes are another solver, four times the iterations, half the time step, and the scene
     without all effects of one name (unless it would have no constraint group left).
@@ -216,7 +217,7 @@ def sensitivities(
     variants = {
         "solver": trajectory(scene, system=scene.system_with(OTHER_SOLVER)),
         "iterations x4": trajectory(scene.changed(iterations=4 * config.count)),
-        # the scene is built anew, which checks that there are not too many frames
+        # building the scene again checks that there are not too many frames
         "h/2": trajectory(Scene.build(halved.config, halved.mesh))[::2],
     }
     for effect in removable(config):
@@ -228,12 +229,12 @@ def sensitivities(
 
 
 def without(effect: str) -> str:
-    """Value of the column ``perturbation`` in rows of runs without ``effect``."""
+    """Return the text in the column ``perturbation`` for runs without ``effect``."""
     return f"without {effect}"
 
 
 def removable(config: SceneConfig) -> list[str]:
-    """Names of all effects but a scene's only constraint group, without which it cannot run."""
+    """List the effects without which a scene can run: all except its only constraint group."""
     names = dict.fromkeys(e.effect for e in config.effects)
     return [name for name in names if config.groups != [name]]
 

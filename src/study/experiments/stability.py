@@ -1,4 +1,4 @@
-"""Short runs of one scene with several time steps and stiffnesses, with every method."""
+"""Run one scene for a short time with several time steps and stiffnesses, with every method."""
 
 import logging
 from collections.abc import Iterator
@@ -33,11 +33,11 @@ FEWEST, MOST = 30, 120  # limits of the number of frames of a short run
 class ShortRuns(ConfigModel):
     """Settings of short runs with other time steps and other stiffnesses of the reduced groups.
 
-    Bases and samples remain those of the scene's own time step and stiffness, so that the runs show
-    how far from these values a reduction can be used.
+    Bases and samples are trained with the time step and stiffness of the scene, so that the runs
+    show how far from these values a reduction can be used.
 
     ranks : basis sizes r of reductions; position subspaces are run at their largest size only
-    time_steps : time steps in seconds, in addition to the scene's own one
+    time_steps : time steps in seconds, in addition to that of the scene
     stiffness_ratios : factors by which weights of reduced groups are multiplied, in addition to 1
     duration : simulated seconds; a run has `FEWEST` to `MOST` frames
     """
@@ -49,12 +49,12 @@ class ShortRuns(ConfigModel):
 
 
 class Stability(ShortRuns):
-    """Section ``stability``: short runs, and limits by which a run is judged.
+    """Section ``stability``: short runs, and limits above which a run is wrong or has diverged.
 
     scenes : names of the scenes; those that are not in the study are ignored
     wrong : a finite run counts as wrong if its relative error exceeds this value
-    left : a run counts as having left the scene if its bounding box exceeds this multiple of the
-        full-order run's largest one
+    left : a run has left the scene if its bounding box exceeds this multiple of the largest
+        bounding box of the full-order run
     """
 
     scenes: tuple[str, ...] = ()
@@ -63,7 +63,7 @@ class Stability(ShortRuns):
 
 
 @kit.experiment(
-    "Time step and stiffness of {scene}",
+    "Runs of {scene} with other time steps and stiffnesses",
     reads={
         "mesh": paths.MESH,
         "bases": Every(paths.BASIS),
@@ -79,7 +79,7 @@ def stability(
     mesh: File, config: SceneConfig, methods: Methods, short: ShortRuns, out: File,
     **files: list[File],
 ) -> None:  # fmt: skip
-    """Make full-order and reduced runs with each time step, then with each stiffness of `short`."""
+    """Run full-order and reduced models with each time step, then with each stiffness."""
     scene = kit.scene_of(config, mesh)
     given = files["samplings"], files["bases"], methods, short.ranks, files["subspaces"]
     found = [({"position_basis": "full"} | own, model) for own, model in stored_models(*given)]
@@ -110,9 +110,9 @@ def _rows(scene: Scene, models: list[tuple[Row, Model | None]]) -> Iterator[Row]
 
     row = {"method": "full", "position_basis": "full"} | full.row(whole)
     if not whole.finite:
-        log.warning("the full-order run blew up: nothing to compare with")
+        log.warning("the full-order run blew up, so that no reduced run is made")
         yield with_energy(row, whole)
         return
     yield with_energy(row | {"relative_error": 0.0}, whole)
-    for labels, model in models:  # a basis with too few modes has no model
+    for labels, model in models:  # the model is None if the basis has too few modes
         yield with_energy(*run(full, model, labels)) if model else labels | {"frames": 0}

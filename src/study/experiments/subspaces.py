@@ -1,7 +1,8 @@
-"""Models in position subspaces, whose projections are full, sampled (ecsw) or interpolated (hrpd).
+"""Make and run models in position subspaces, with all, sampled or interpolated projections.
 
-For a large scene, one job makes the models and the full-order runs, which no other job reads.
-`live` writes the models of a scene to a file that a web page loads.
+Methods are called full, ecsw (energy-conserving sampling) and hrpd (interpolated projections). For
+a large scene, one job also makes the full-order runs, which no other job reads. `live` writes the
+models of a scene to a file that a web page loads.
 """
 
 import logging
@@ -65,7 +66,7 @@ class SubspaceModels(ConfigModel):
 
     bases, sizes : kinds of basis, and numbers of modes k
     tolerances : relative residuals of energy-conserving sampling (ecsw)
-    hrpd : settings of models with interpolated projections; None for no such models
+    hrpd : settings of models with interpolated projections; None: no models of this kind
     """
 
     bases: tuple[kit.PositionBasis, ...] = ("pod", "skinning")
@@ -74,7 +75,7 @@ class SubspaceModels(ConfigModel):
     hrpd: Hrpd | None = None
 
     def methods(self, kind: str, k: int) -> list[str]:
-        """Names of the configured models on a basis of ``kind`` with k modes; empty if none."""
+        """Return the names of the configured models on a basis of ``kind`` with k modes."""
         if kind not in self.bases or k not in self.sizes:
             return []
         tolerances = self.tolerances if kind == "pod" else ()
@@ -84,7 +85,7 @@ class SubspaceModels(ConfigModel):
 
 
 class Subspace(SubspaceModels):
-    """Section ``subspace``: models in position subspaces, and their ``scenes`` (empty: all)."""
+    """Section ``subspace``: models in position subspaces, and their ``scenes`` (default: all)."""
 
     scenes: tuple[SceneName, ...] = ()
 
@@ -123,7 +124,7 @@ def subspaces(
     full_order: list[File], converged: list[File], config: SceneConfig, asked: SubspaceModels,
     **files: File,
 ) -> None:  # fmt: skip
-    """Build a model for every basis, size and sampling, and run all motions with each."""
+    """Build a model for every basis, size and sampling, and run all trajectories with each."""
     motions = {
         run["run"]: Yardstick(
             kit.scene_of(config, files["mesh"], run["run"]),
@@ -145,7 +146,7 @@ def subspaces(
 
 
 @kit.experiment(
-    "Reduction of {scene}",
+    "Reduced models of {scene}",
     reads={
         "sources": SourcesOf("scene.mesh"),
         "config": Setting("scene"),
@@ -156,9 +157,9 @@ def subspaces(
 def online(
     sources: list[Path], config: SceneConfig, asked: LargeModels, out: File, models: File
 ) -> None:
-    """Build every model of a large scene, and run all motions with each model.
+    """Build every model of a large scene, and run all trajectories with each model.
 
-    The mesh is built here, from the files ``sources``; full-order runs are made, but not stored.
+    The mesh is built from the files ``sources``; the full-order runs are not stored.
     """
     mesh = config.mesh.build(Path())
     variants = {kit.TRAIN: config} | {str(name): config.heldout_variant(name) for name in MOTIONS}
@@ -181,10 +182,10 @@ def online(
 def _runs(
     file: h5py.File, motions: Mapping[str, Yardstick], settings: SubspaceModels, compared: bool
 ) -> pd.DataFrame:
-    """Train every model on the training motion, run all motions with it, and return the rows.
+    """Train every model on the training trajectory, run all trajectories, and return table rows.
 
-    ``file`` receives the models and, if ``compared``, also the subspace coordinates of each run and
-    its deviations from the full-order run.
+    The models are written to ``file``, and if ``compared``, also the subspace coordinates of each
+    run and its deviations from the full-order run.
     """
     rows: list[Row] = []
     training = motions[kit.TRAIN]
@@ -216,7 +217,7 @@ def _runs(
 def _models(motion: Yardstick, settings: SubspaceModels) -> Iterator[subspace.Labelled]:
     """Yield labels (with the time of the training) and model for each of ``settings``.
 
-    Only even frames of the ``motion`` are used for training, as for bases of projections.
+    Only even frames of the trajectory are used for training, as for bases of projections.
     """
     scene, points = motion.scene, motion.scene.mesh.points
     count = max(plan.train for plan in scene.config.reduce.values())
@@ -251,8 +252,8 @@ JOINT = "deim-joint"
 class LiveModels(ConfigModel):
     """Settings of the models on the web page; models that the study does not have are left out.
 
-    ``sizes`` are numbers of modes k. ``joint_rows`` is the number of modes r of models whose
-    projections are interpolated from rows that are chosen once for x, y and z together."""
+    ``sizes`` are numbers of modes k. ``joint_rows`` is the number of modes r of models that
+    interpolate projections from selected rows, each shared by x, y and z."""
 
     sizes: tuple[kit.Modes, ...] = (10, 20, 40)
     tolerances: tuple[kit.Tolerance, ...] = (3e-2, 1e-2, 1e-3)
@@ -260,7 +261,7 @@ class LiveModels(ConfigModel):
 
 
 class Live(LiveModels):
-    """Section ``live``: models on the web page, and ``scenes`` from which a reader can choose.
+    """Section ``live``: models on the web page, and ``scenes`` between which a reader can choose.
 
     Scenes for which the study has no models in position subspaces are left out.
     """
@@ -269,7 +270,7 @@ class Live(LiveModels):
 
 
 class JointRows(kit.OfScene):
-    """Constraint group that method `JOINT` reduces: it samples x, y and z of each selected row."""
+    """A constraint group that method `JOINT` reduces, with one shared row for x, y and z."""
 
     group: str
     method: str = JOINT
@@ -286,7 +287,7 @@ class Options(ConfigModel):
 
 
 @kit.experiment(
-    "Models of {scene} for the page",
+    "Models of {scene} for the web page",
     reads={
         "mesh": paths.MESH,
         "train": paths.TRAIN,
@@ -301,8 +302,8 @@ class Options(ConfigModel):
 def live(mesh: File, train: File, settings: Options, out: File, **files: list[File]) -> None:
     """Write reduced models of a scene and its full-order run to the file that the web page loads.
 
-    ``bases`` and ``samplings`` are files of the groups that ``settings.joint_rows`` lists: each
-    sampled row is used for x, y and z.
+    ``bases`` and ``samplings`` are files of the groups that ``settings.joint_rows`` lists, where x,
+    y and z share each sampled row.
     """
     scene = kit.scene_of(settings.scene, mesh)
     reference = kit.positions_of(train)
@@ -332,8 +333,8 @@ def _joint(
 ) -> Iterator[subspace.Labelled]:
     """Yield a model for each subspace in ``beside``, with ``group`` interpolated by ``reduction``.
 
-    Other groups have the sampled elements of a model ``beside`` with this subspace. ``reduction``
-    selects rows for x, y and z together.
+    All other groups keep the sampled elements of a model in ``beside``. The rows that ``reduction``
+    selects are shared by x, y and z.
     """
     for model in {id(model.columns): model for _, model in beside}.values():
         joint = interpolation_of(scene.group(group), model.columns, reduction)

@@ -1,6 +1,6 @@
-"""Times of full-order and reduced runs, of single local steps, and of effects.
+"""Time full-order and reduced runs, single local steps, and effects.
 
-`timing` measures on a scene's own mesh, `scaling` times iterations on meshes of other sizes.
+`timing` uses the mesh of a scene; `scaling` times iterations on meshes of other sizes.
 """
 
 import logging
@@ -53,7 +53,7 @@ class NumpyLocalStep:
         self._lift = sparse.csr_array(group.S.T.multiply(group.row_weights[None, :]))
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
-        """Add S^T W p(y), p the projections at ``y`` (N, 3) m, to ``rhs``; return the energy, J."""
+        """Add S^T W p to ``rhs``, with projections p at ``y`` (N, 3) m; return the energy, J."""
         d, every = self.group.S @ y, np.arange(self.group.elements)
         p = self.group.reference_project(d.reshape(self._shape), every).reshape(d.shape)
         energy = 0.5 * float(np.sum(self._weights * (d - p) ** 2))
@@ -87,7 +87,7 @@ class InterpretedLocalStep(NumpyLocalStep):
         return energy
 
 
-# Name -> implementation of a local step that is timed in addition to the compiled one.
+# Name -> implementation of a local step that is timed in addition to the compiled local step.
 IMPLEMENTATIONS = {"numpy": NumpyLocalStep, "interpreted": InterpretedLocalStep}
 
 
@@ -102,17 +102,17 @@ ITERATIONS = [
     "scene", "method", "vertices", "elements", "r", "k", "elements_sampled",
     "ms_per_iteration", "local_ms", "global_ms", "vertices_ms", "local_share",
 ]  # fmt: skip
-# Methods whose local steps are timed on meshes of increasing size; the one that is run, and the
-# tolerance of the sampling beside it.
+# Methods whose local steps are timed on meshes of increasing size; the method whose runs are timed;
+# the tolerance of the energy-conserving sampling that is timed, too.
 SCALED, METHOD, TOLERANCE = ("deim-joint", "block-deim"), "block-deim", 1e-2
-STATES, SIZED_STATES = 5, 4  # `timing`, `scaling` time local steps at positions of so many frames
+STATES, SIZED_STATES = 5, 4  # numbers of frames in which `timing` and `scaling` time local steps
 TrainingFrames = Annotated[int, Field(ge=3, le=1000)]
 
 
 class Timing(Protocol):
     """Section ``timing``: numbers of frames, iterations and repeats in timing jobs.
 
-    ``breakeven`` are sizes r of reduced local steps that are timed by themselves, not in runs.
+    ``breakeven`` are sizes r of reduced local steps that are timed outside of runs.
     """
 
     numpy_frames: kit.Count = 4
@@ -151,7 +151,7 @@ class Options(ConfigModel):
     alone=True,
 )
 def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
-    """Measure times of frames, local steps and effects, and of frames with an effect left out."""
+    """Time frames, local steps and effects, and frames of scenes that lack an effect."""
     scene, asked = kit.scene_of(settings.scene, mesh), settings.timing
     name, frames = scene.config.name, min(asked.frames, scene.config.frames)
     common = {"scene": name, "vertices": scene.mesh.vertices, "implementation": "compiled"}
@@ -193,7 +193,7 @@ def timing(mesh: File, fom: File, settings: Options, **files: Any) -> None:
 def _full_order(
     scene: Scene, frames: int, asked: Timing, common: dict[str, Any]
 ) -> tuple[Variant, list[Variant]]:
-    """Return the full-order runs to time: interpreted code with fewer iterations; all others."""
+    """Return full-order runs to time: that in interpreted code (fewer iterations); all others."""
     made = [variant(scene, frames, common)]
     for name, step in IMPLEMENTATIONS.items():
         steps = [step(group) for group in scene.groups]
@@ -207,7 +207,7 @@ def _full_order(
 def _other_settings(
     scene: Scene, frames: int, asked: IterationCounts, common: dict[str, Any]
 ) -> list[Variant]:
-    """Full-order runs with other settings than the scene's: iterations, acceleration, meshes."""
+    """Return full-order runs with other iterations, acceleration or meshes than the scene's."""
     own = {"method": kit.FOM, **{key: common[key] for key in ("iterations", "vertices")}}
     return [
         each.variant(common, frames)
@@ -217,7 +217,7 @@ def _other_settings(
 
 
 class SizedBreakEven(ConfigModel):
-    """Settings of reduced local steps of sizes r that are timed outside of runs, on every mesh."""
+    """Settings of reduced local steps (sizes r) that are timed outside of runs, on every mesh."""
 
     sizes: tuple[kit.Modes, ...] = (5, 10, 20, 40, 80)
     training_frames: TrainingFrames = 84
@@ -227,8 +227,8 @@ class SizedBreakEven(ConfigModel):
 class Sized(Protocol):
     """Settings of the timing on one mesh size.
 
-    Trained on ``training_frames`` frames and timed are a reduced local step with r modes, and
-    energy-conserving sampling in a position subspace of k modes.
+    Two models are trained on ``training_frames`` frames and timed: a reduced local step with r
+    modes, and energy-conserving sampling in a position subspace with k modes.
     """
 
     r: kit.Modes = 10
@@ -239,7 +239,7 @@ class Sized(Protocol):
 
 
 class Scaling(Sized):
-    """Section ``scaling``; ``scenes``: scene -> factors that multiply the vertex count per side."""
+    """Section ``scaling``; ``scenes``: scene -> factors of the number of vertices along a side."""
 
     scenes: kit.Sizes = Field(default_factory=dict)
 
@@ -259,7 +259,7 @@ class SizedOptions(ConfigModel):
     alone=True,
 )
 def scaling(sources: list[Path], settings: SizedOptions, iterations: File, breakeven: File) -> None:
-    """Time a scene on its mesh, refined by the factor in the label "factor" of the output files."""
+    """Time a scene on its mesh, refined by the label "factor" of the output files."""
     config, sized = settings.scene, settings.scaling
     specs, alone = settings.scaled_methods, settings.scaling.breakeven
     factor = float(iterations["factor"])
@@ -307,7 +307,7 @@ def scaling(sources: list[Path], settings: SizedOptions, iterations: File, break
 def _reductions(
     scene: Scene, p: np.ndarray, roundoff: np.ndarray, spec: MethodSpec, asked: Sequence[int]
 ) -> list[Reduction]:
-    """Reductions of the first group to r modes (at most the basis's rank) for each r ``asked``."""
+    """Reduce the first group to r modes (at most the rank of the basis) for each r ``asked``."""
     noise = float(np.linalg.norm(roundoff))
     basis = group_basis(scene.groups[0], scene.masses, p, noise, spec)
     sizes = sorted({min(r, basis.rank) for r in asked})

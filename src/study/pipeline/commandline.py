@@ -1,4 +1,4 @@
-"""Parsing and checking of Snakemake's command line, and a record of the last run's configuration.
+"""Parse and check Snakemake's command line, and record the configuration of the last run.
 
 The configuration files are checked before Snakemake reads them. Snakemake itself would silently use
 the last one of two equal keys, run code from a file with the key ``__use_yte__``, and show a
@@ -20,17 +20,17 @@ from pdrom.core.errors import INTERRUPTED, ConfigurationError, PdromError, reaso
 from pdrom.core.yamlfile import read_yaml, require_as_written, shown
 from study.pipeline.folders import folders
 
-# Options with which Snakemake only prints or draws something and runs no job.
+# Options with which Snakemake prints or draws something and runs no job.
 LOOKS_ONLY = (
     "dryrun", "lint", "list_rules", "list_target_rules", "print_compilation", "containerize",
     "dag", "rulegraph", "filegraph", "d3dag", "list_conda_envs", "list_changes",
     "list_input_changes", "list_params_changes", "list_untracked", "summary", "detailed_summary",
     "archive", "generate_unit_tests",
 )  # fmt: skip
-# Options about Snakemake's output; if one is given, our short log lines do not replace this output.
+# Options about Snakemake's output; with one of them, this output is not replaced by short lines.
 OWN_OUTPUT = ("logger", "quiet", "verbose", "printshellcmds", "debug_dag")
-# Options of every run. The greedy scheduler chooses jobs fast. Snakemake's default scheduler solves
-# an integer program at each choice, which takes more time than it saves, since jobs are short.
+# Options of every run. Snakemake's default scheduler solves an integer program to choose jobs. This
+# takes more time than it saves because jobs are short; the greedy scheduler chooses fast.
 OPTIONS = ("--scheduler", "greedy", "--rerun-incomplete")
 CORES, LINES = ("--cores", "all"), ("--logger", "pdrom")
 TEMPLATE_KEY = "__use_yte__"
@@ -40,13 +40,13 @@ RECORD = Path(".snakemake/last_run.json")
 class CommandLine:
     """Options of Snakemake's command line that this project evaluates.
 
-    Raises ConfigurationError for a wrong option, or a target that was read as an option's value.
+    Raises ConfigurationError for a wrong option or wrong value, which may be meant as a target.
 
     looks_only : True if no job runs and no result is written
     plans : True for a dry run (``-n``) without any other option of `LOOKS_ONLY`
-    makes : True if results are made or a dry run plans to; False with ``--touch``, too
+    makes : True if jobs run or a dry run lists them; False for ``--touch``, too
     more : options that this project adds
-    executor : Snakemake's executor, from command line or profile; None runs jobs on this machine
+    executor : Snakemake's executor, from command line or profile; None: jobs run on this machine
     """
 
     def __init__(self, arguments: Sequence[str]) -> None:
@@ -71,12 +71,12 @@ class CommandLine:
 
     @property
     def configuration(self) -> list[str]:
-        """Options that name the configuration; an empty list for the default configuration."""
+        """Command-line options that select the configuration; empty for the default one."""
         files = ["--configfile", *self.configfiles] if self.configfiles else []
         return [*files, *(["--config", *self.settings] if self.settings else [])]
 
     def rewritten(self, more: Sequence[str], made: Mapping[str, Sequence[str]]) -> list[str]:
-        """Arguments plus the options ``more``; the files ``made[target]`` replace each target."""
+        """Return the arguments and the options ``more``, with files ``made[target]`` as targets."""
         targets = dict.fromkeys(file for target in self.targets for file in made[target])
         options = list(self.arguments)[: [*self.arguments, "--"].index("--")]
         # without "--", targets may stand anywhere among the options: remove each of them once
@@ -87,7 +87,7 @@ class CommandLine:
 
 def parsed(arguments: Sequence[str]) -> dict[str, Any]:
     """Return the options that Snakemake finds in ``arguments`` and the profiles that they name."""
-    # not imported at the top: jobs import this module, too, and need no parser
+    # not imported at the top, because jobs import this module and need no parser
     from snakemake.cli import parse_args, parse_config
 
     said, fault = io.StringIO(), ""
@@ -102,14 +102,14 @@ def parsed(arguments: Sequence[str]) -> dict[str, Any]:
     except Exception as error:
         fault = f"{' '.join(arguments)}: {error}"
     if fault:
-        more = ".venv/bin/snakemake --help explains the options; write -- before targets"
+        more = ".venv/bin/snakemake --help lists the options; write -- before targets"
         raise ConfigurationError(f"{fault} ({more})")
     return found
 
 
 def completed(arguments: Sequence[str]) -> list[str]:
     """Return ``arguments`` with the options that Snakemake needs, and files in place of names."""
-    # not imported at the top: it loads NumPy, and environment variables must be set before
+    # not imported at the top, because it loads NumPy, before which environment variables are set
     from study.pipeline.targets import figure_file, files
 
     if "figure" in arguments:
@@ -128,7 +128,7 @@ def completed(arguments: Sequence[str]) -> list[str]:
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
-    """Raise ConfigurationError if a file is no mapping or has the key that enables templates."""
+    """Raise ConfigurationError if a file is not a mapping or has the key that enables templates."""
     for path in map(Path, paths):
         content = read_yaml(path)
         if not isinstance(content, dict):
@@ -140,7 +140,7 @@ def check_files(paths: Iterable[str | Path]) -> None:
 
 @contextmanager
 def one_line() -> Iterator[None]:
-    """Context in which an error of users or files ends the process with a message of one line."""
+    """Within this context, end the process with one line if a user's input or a file is faulty."""
     try:
         yield
     except PdromError as error:
@@ -153,10 +153,10 @@ def one_line() -> Iterator[None]:
 
 
 def remember(command: CommandLine) -> None:
-    """Write the configuration options of ``command``, which is about to run, to file `RECORD`."""
+    """Write the options that select the configuration of ``command`` to the file `RECORD`."""
     RECORD.write_text(json.dumps(command.configuration), encoding="utf-8")
 
 
 def recall() -> list[str]:
-    """Options that name the last run's configuration; [] for the default, or without a last run."""
+    """Return the options that select the last run's configuration; [] for the default or no run."""
     return list(json.loads(RECORD.read_text("utf-8"))) if RECORD.is_file() else []

@@ -1,4 +1,4 @@
-"""Report printed at the end of a failed run: every failed job with the cause of the failure."""
+"""Report the failed jobs at the end of a failed run, each with the cause of its failure."""
 
 import logging
 import re
@@ -33,7 +33,7 @@ class Failures(logging.Handler):
             said, log = self._said.pop(record.thread, ""), record.log[0]
             if errors := _ERROR.findall(written(log)):
                 self._lines.append(f"job {record.rule_name} failed: {errors[-1]}")
-            elif not record.indent:  # all jobs of a failed batch are indented, finished ones, too
+            elif not record.indent:  # Snakemake indents all jobs of a failed batch, also finished
                 made = f"job {record.rule_name} failed while making {record.output[0]}"
                 self._lines.append(f"{made}: {said} (log: {log})")
 
@@ -43,6 +43,6 @@ class Failures(logging.Handler):
 
 
 def written(log: str) -> str:
-    """Text of the file ``log``, which Snakemake removes when it starts a job; "" without one."""
+    """Return the text of the file ``log``; "" if it is missing, as when its job has just begun."""
     path = Path(log)
     return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""

@@ -1,7 +1,7 @@
-"""Fingerprints: hashes of the code that a job runs, without its comments and docstrings.
+"""Compute fingerprints: hashes of the code that a job runs, without comments and docstrings.
 
-Each rule has the fingerprint of the modules that its job runs as a parameter: Snakemake reruns the
-job if it changes (docs/decisions/0001-code-fingerprints.md).
+A rule has the fingerprint of its job's code as a parameter, so that Snakemake reruns the job if the
+code changes (docs/decisions/0001-code-fingerprints.md).
 """
 
 import ast
@@ -20,16 +20,16 @@ from pdrom.core.registry import Registry
 from pdrom.core.store import write_text
 from study.artifact.planned import PACKAGES, SCRIPT, noted, plan
 
-# Modules that only define paths of files. They are left out of fingerprints, so that a new kind of
-# file causes no reruns; Snakemake itself notices if the paths of a job's files change.
+# Modules that only define paths of files. Fingerprints leave them out, so that a new kind of file
+# causes no reruns; Snakemake reruns a job if the paths of its files change.
 LAYOUT = {"study.artifact.paths", "study.artifact.reads"}
 
 
 class Memory:
     """JSON data that earlier commands computed, by hash of everything on which they depend.
 
-    path : file with the data; one that is missing, damaged or read-only does no harm
-    most : number of entries that are kept although this command has not used them, newest first
+    path : file with the data; it may be missing, damaged or read-only
+    most : number of entries, the newest, that are kept although this command has not used them
     """
 
     def __init__(self, path: Path, most: int = 0) -> None:
@@ -40,19 +40,19 @@ class Memory:
             self._held = {}
 
     def get(self, compute: Callable[[], Any], *sources: str) -> Any:
-        """Return what ``compute`` returns; it depends only on ``sources`` and Python's version."""
+        """Return the result of ``compute``, which depends on ``sources`` and Python's version."""
         key = _key(sources)
         if key not in self._used:
             self._used[key] = self._held[key] if key in self._held else compute()
         return self._used[key]
 
     def put(self, value: Any, *sources: str) -> None:
-        """Let `get` return ``value`` for ``sources`` from now on."""
+        """Store ``value``, which `get` then returns for ``sources``."""
         self._used[_key(sources)] = value
         self._held.pop(_key(sources), None)
 
     def save(self) -> None:
-        """Write the data that `get` returned into the file, if any are new."""
+        """Write the data that `get` has returned to the file, if some of them are new."""
         if not self._used.keys() <= self._held.keys():
             others = [item for item in self._held.items() if item[0] not in self._used]
             kept = dict(others[len(others) - min(len(others), self._most) :])
@@ -72,11 +72,11 @@ def memory() -> Memory:
 
 @cache
 def fingerprint(*places: str) -> str:
-    """SHA-256 over the given modules and over all modules of `PACKAGES` that they import.
+    """Compute SHA-256 of the code of the given modules and all of `PACKAGES` that they import.
 
-    Imports inside functions are found, too. A registry maps names to strings "module:attribute",
-    which are imported on demand. Modules named in a registry are left out unless ``places`` has
-    their entries. Raises ConfigurationError if a module does not exist.
+    Imports inside functions count. A registry maps names to strings "module:attribute", which are
+    imported on demand; its modules are left out unless ``places`` has their entries. Raises
+    ConfigurationError if a module does not exist.
 
     places : names of modules, or "module:attribute" for an entry of a registry
     """
@@ -89,7 +89,7 @@ def fingerprint(*places: str) -> str:
 
 
 def closure(*places: str) -> list[str]:
-    """Sorted names of modules in the `fingerprint`: those of ``places`` and all they import."""
+    """Return the sorted names of the modules of ``places`` and of all that they import."""
     reached: set[str] = set()
     waiting = [place.partition(":")[0] for place in places]
     while waiting:
@@ -102,9 +102,9 @@ def closure(*places: str) -> list[str]:
 
 @cache
 def _read(module: str) -> tuple[list[str], str]:
-    """Names of the project's modules (and their packages) that it imports; hash of its code."""
+    """Return modules of the project that ``module`` imports, their packages, its code's hash."""
     if module not in plan():
-        raise ConfigurationError(f"fingerprint: no module '{module}' in the packages")
+        raise ConfigurationError(f"fingerprint: the packages have no module '{module}'")
     text, own = (plan()[name][1] for name in (module, __name__))
     found, code = memory().get(lambda: _parsed(text, module), own, module, text)
     known = {name for name in found if name in plan()}
@@ -113,7 +113,7 @@ def _read(module: str) -> tuple[list[str], str]:
 
 
 def _parsed(text: str, module: str) -> tuple[list[str], str]:
-    """Names that the code ``text`` of ``module`` may import, sorted, and the hash of the code."""
+    """Return sorted names that the code ``text`` of ``module`` may import, and the code's hash."""
     tree = ast.parse(text)
     found: set[str] = set()
     for node in _statements(tree):
@@ -136,10 +136,10 @@ def _statements(tree: ast.AST) -> list[ast.AST]:
 
 
 def digest_of_code(tree: ast.Module, module: str = "") -> str:
-    """Hash of parsed code without comments, layout, docstrings and most registry entries.
+    """Compute the hash of parsed code without comments, layout, docstrings, most registry entries.
 
-    Entries "module:attribute" of a `Registry` in the code are left out, unless their module is
-    ``module``, to which the code belongs.
+    Entries "module:attribute" of a `Registry` are left out, except those of ``module``, to which
+    the code belongs.
     """
     for node in _statements(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
@@ -157,16 +157,16 @@ def digest_of_code(tree: ast.Module, module: str = "") -> str:
 
 
 def digest(root: Path, *names: str) -> str:
-    """Checksum (16 hexadecimal digits) of the hand-edited files ``names`` below ``root``."""
+    """Return a checksum (16 hexadecimal digits) of the hand-edited files ``names`` in ``root``."""
     files = [noted(root / name) for name in names]
     content = b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files if f.is_file())
     return hashlib.sha256(content).hexdigest()[:16]
 
 
 def track_scripts(workflow: Any) -> None:
-    """Make Snakemake repeat jobs if the code of their script changes, whatever the file's date.
+    """Make Snakemake repeat jobs if the code of their script changes, not if its date does.
 
-    The date of the script would repeat all jobs after a copy of the files.
+    After the files are copied, all dates are new, although no result would change.
     """
     # not imported at the top, so that a plan can be made without Snakemake
     from snakemake.settings.types import RerunTrigger
@@ -175,7 +175,7 @@ def track_scripts(workflow: Any) -> None:
         if rule.script:
             text = noted(Path(SCRIPT)).read_text(encoding="utf-8")
             rule.set_params(script=digest_of_code(ast.parse(text))[:16])
-    # Snakemake sets its triggers of reruns later; this property leaves out `CODE` (changed scripts)
+    # Snakemake sets its triggers of reruns later; this property removes `CODE` (script changed)
     type(workflow).rerun_triggers = property(
         lambda self: frozenset(self.dag_settings.rerun_triggers) - {RerunTrigger.CODE}
     )

@@ -1,4 +1,4 @@
-"""Folders of results: each configuration of the study has its own results folder."""
+"""Find the results folder of a configuration; every configuration has another folder."""
 
 import re
 from collections.abc import Iterable
@@ -36,7 +36,7 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
     The default configuration has the folders ``results`` and ``paper``. Every other configuration
     has ``results/studies/NAME``. NAME is the value of its key ``study``; without this key, it is
     the name of the last of ``configfiles`` without suffix; without files, it is `OWN`. Raises
-    ConfigurationError if NAME has over 60 characters or others than letters, digits, _ and -.
+    ConfigurationError unless NAME consists of at most 60 letters, digits, _ and -.
     """
     default, pairs = Path(DEFAULT).resolve(), list(settings)
     files = [str(file) for file in configfiles if Path(file).resolve() != default]
@@ -48,8 +48,8 @@ def folders(configfiles: Iterable[str | Path], settings: Iterable[str]) -> Folde
     name = [*named, Path(files[-1]).stem if files else OWN][0]
     if not _NAME.fullmatch(name):
         raise ConfigurationError(
-            f"{KEY} = '{name}': no name of a folder; letters, digits, _ and - are allowed, "
-            f"60 at most (set the key {KEY} where the name of the configuration file is none)"
+            f"{KEY} = '{name}': cannot name a folder; use at most 60 letters, digits, _ and - "
+            f"(if this is the name of the configuration file, set the key {KEY})"
         )
     results = f"{RESULTS}/studies/{name}"
     return Folders(results, f"{results}/paper/main.pdf")

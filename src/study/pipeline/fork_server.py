@@ -1,7 +1,7 @@
-"""Start of jobs as forks of a process in which the libraries are already loaded.
+"""Start jobs as forks of a process in which the libraries are already loaded.
 
-Snakemake executes a script in a thread of the run. This thread starts a process by Python's fork
-server (`multiprocessing`) and waits for its end (docs/decisions/0005-fork-server.md).
+Snakemake executes a script in a thread of the run. This thread lets Python's fork server
+(`multiprocessing`) start a process, and waits for its end (docs/decisions/0005-fork-server.md).
 """
 
 import fcntl
@@ -23,7 +23,7 @@ from study.artifact import planned
 
 # On macOS, forks of a process that has loaded system frameworks are unsafe.
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"
-# `multiprocessing` starts and collects processes in one thread at a time.
+# `multiprocessing` may start and collect processes only in one thread at a time.
 _ONE_AT_A_TIME = Lock()
 ATTEMPTS = 50
 
@@ -31,7 +31,7 @@ ATTEMPTS = 50
 def start_server(preloaded: str = "study.pipeline.preloaded") -> None:
     """Start the fork server, which imports ``preloaded``, and let Snakemake use `run_script`.
 
-    A script in a container is left to Snakemake.
+    Snakemake itself runs scripts that have a container.
     """
     if METHOD == "forkserver":
         multiprocessing.set_forkserver_preload([preloaded])
@@ -50,8 +50,8 @@ def start_server(preloaded: str = "study.pipeline.preloaded") -> None:
 def run_script(script: str) -> None:
     """Run the file ``script`` in a fork of the server, or in a new interpreter on macOS.
 
-    Raises CalledProcessError with the exit status, or the negative number of the signal, of a
-    script that fails, as `subprocess` does.
+    If the script fails, raises CalledProcessError with its exit status, or the negative number of
+    the signal that ended it, as `subprocess` does.
     """
     with _ONE_AT_A_TIME:
         job = _started(script)
@@ -65,12 +65,12 @@ def run_script(script: str) -> None:
 
 
 def _started(script: str, attempts: int = ATTEMPTS) -> Any:
-    """Start a process that runs ``script``; another server takes the place of one that has died."""
+    """Start a process that runs ``script``; if the fork server has died, start another server."""
     context = cast(Any, multiprocessing.get_context(METHOD))
     job = context.Process(target=_run_as_main, args=[script])
     try:
         job.start()
-    except (EOFError, OSError):  # a server that was just killed is not yet seen as ended
+    except (EOFError, OSError):  # the system may report a server that was killed only later
         if attempts == 1:
             raise
         time.sleep(0.1)
@@ -79,16 +79,16 @@ def _started(script: str, attempts: int = ATTEMPTS) -> Any:
 
 
 def _run_as_main(script: str) -> None:
-    """Run ``script`` as a main program, in a process group that ends with the run."""
+    """Run ``script`` as a main program, in a process group that ends when the run ends."""
     planned.import_planned()
     os.setpgid(0, 0)
     if sys.platform == "linux":
-        # the system kills the group when the run closes its end of this pipe, however it ends
+        # the system kills the group when the run closes its end of this pipe, even if it is killed
         run = cast(int, cast(Any, multiprocessing.parent_process()).sentinel)
         fcntl.fcntl(run, fcntl.F_SETOWN, -os.getpid())
         fcntl.fcntl(run, fcntl.F_SETSIG, signal.SIGKILL)
         fcntl.fcntl(run, fcntl.F_SETFL, os.O_ASYNC)
-        if wait([run], timeout=0):  # it has ended before
+        if wait([run], timeout=0):  # the run has ended before this process asked for the signal
             os._exit(1)
     sys.argv, sys.path[0] = [script], os.path.dirname(script)
     runpy.run_path(script, run_name="__main__")

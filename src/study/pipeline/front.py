@@ -1,7 +1,7 @@
-"""``./reproduce ARGS...``: Snakemake with the options, target names and messages of this project.
+"""Run Snakemake for ``./reproduce ARGS...``, with options, target names and messages of pdrom.
 
-It completes the arguments, checks the configuration files, and then does what ``snakemake`` does,
-unless the first argument is a key of `HANDED_ON`.
+The arguments are completed, the configuration files are checked, and Snakemake is run. If the first
+argument is a key of `HANDED_ON`, its program is run instead.
 """
 
 import os
@@ -22,7 +22,7 @@ HANDED_ON = {
 def main() -> None:
     """Run Snakemake, or the module or program that the first argument selects, and exit."""
     handle(leave)
-    # other modules are not imported at the top: until here, a signal ends this without a word
+    # other modules are imported only now: before `handle`, a signal would end this without a line
     from pdrom.core.environment import settle
 
     settle()

@@ -1,6 +1,6 @@
-"""The manifest of a study: a list of its result files, with checksums and their origin.
+"""List the result files of a study in a manifest, with their checksums and origin.
 
-Every successful run writes it, from the checksums of the files. Equal results have equal manifests.
+Every successful run writes the manifest. Equal results have equal manifests.
 """
 
 import json
@@ -69,8 +69,8 @@ def read_manifest(results: str) -> Manifest:
     """Read the manifest of a folder; StorageError if it is missing, damaged or of old format."""
     path = Path(paths.MANIFEST.at(results))
     if check_file(path) is Condition.DAMAGED:
-        raise StorageError(f"{path}: damaged, its content and its checksum differ")
+        raise StorageError(f"{path}: damaged (its content does not fit its checksum)")
     try:
         return Manifest.model_validate_json(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise StorageError(f"{path}: no manifest of this version of pdrom") from error
+        raise StorageError(f"{path}: not a manifest of this version of pdrom") from error

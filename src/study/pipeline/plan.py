@@ -1,6 +1,6 @@
-"""Plan of a study: the jobs of every artifact (function declared to make files).
+"""Plan a study: find the jobs of every artifact (function declared to make files).
 
-The workflow turns each `Job` (files, settings, fingerprint of its code) into one of Snakemake.
+The workflow turns each `Job` (files, settings, fingerprint of its code) into a job of Snakemake.
 """
 
 import logging
@@ -42,7 +42,7 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Warn of scenes that position subspaces cannot represent, or refuse them where listed."""
+    """Warn of scenes that position subspaces cannot represent; refuse them in lists for these."""
     outside = {
         name: effects
         for name, config in {**study.scenes, **study.online}.items()
@@ -52,12 +52,12 @@ def check_subspaces(study: Study) -> None:
         for name in getattr(study.settings, key).scenes:
             if name in outside:
                 raise ConfigurationError(
-                    f"{key}.scenes: scene '{name}' has the effect '{outside[name][0]}', which no "
-                    "position subspace takes"
+                    f"{key}.scenes: scene '{name}' has the effect '{outside[name][0]}', which "
+                    "position subspaces cannot represent"
                 )
     for name, effects in outside.items():
         words = "', '".join(effects)
-        log.warning("%s: no position subspaces, since none takes the effect '%s'", name, words)
+        log.warning("%s: no position subspaces: they cannot represent the effect '%s'", name, words)
 
 
 def check_live(study: Study) -> None:
@@ -70,7 +70,7 @@ def check_live(study: Study) -> None:
 
 
 def check_texts(study: Study) -> None:
-    """Raise ConfigurationError if figures or TeX cannot typeset a text of a method or claim."""
+    """Raise ConfigurationError if a method or claim has characters that cannot be typeset."""
     folder = study.root / "config"
     for name, method in study.methods.items():
         require_typeset(method.title, f"{folder / 'methods.yaml'}: {name}.title")
@@ -81,12 +81,12 @@ def check_texts(study: Study) -> None:
 
 @dataclass(frozen=True)
 class Job:
-    """A job: an artifact (function that makes files), with all that its function gets.
+    """A job: an artifact (function that makes files), with all arguments of its function.
 
     labels : scene, group ... in the output paths, such as {"scene": "bar_release"}
     inputs, outputs : parameter of the function -> paths of files
     settings : parameter of the function -> JSON data
-    content : checksum of hand-edited inputs, as a file's date does not tell if it changed
+    content : checksum of hand-edited inputs, because dates of files do not show if they changed
     code : fingerprint (hash) of the code that the job runs
     """
 
@@ -104,7 +104,7 @@ class Job:
         make(self.artifact.address, outputs=outputs, **{name: getattr(self, name) for name in own})
 
     def origin(self, path: str, digests: Iterable[str]) -> dict[str, str]:
-        """Entries of the checksum of the output ``path`` if `results` have these ``digests``."""
+        """Return the origin to be stored with the output ``path`` if `results` have ``digests``."""
         job = (self.artifact, self.settings, self.labels, self.code, self.content)
         with recorded(*job, digests):
             said = provenance(path)
@@ -112,7 +112,7 @@ class Job:
 
     @cached_property
     def results(self) -> list[str]:
-        """Input paths of the job that other jobs make."""
+        """Paths of the job's inputs that other jobs make."""
         return self.artifact.paths(self.inputs, edited=False)
 
     @property
@@ -122,7 +122,7 @@ class Job:
 
 
 OF_STUDY = Folders()
-# Table -> settings of which an own study must list something, or else the table has no row.
+# Table -> settings; if all of them are empty in a user's study, the table would have no row.
 NEEDED = {"speedups": ("subspace_cases", "projection_cases", "large_scenes")}
 
 
@@ -132,7 +132,7 @@ def load_plan(
     folders: Folders = OF_STUDY,
     quiet: bool = False,
 ) -> "Plan":
-    """Return the checked plan of ``config``; PdromError, which names ``files``, if it is faulty."""
+    """Return the checked plan of ``config``; PdromError that names ``files`` if it is faulty."""
     names = [os.path.relpath(path) for path in files] or [DEFAULT]
     source = f"configuration ({', '.join(sorted(set(names)))})"
     others = ", ".join(sorted({*names} - {DEFAULT})) or "the command line"
@@ -143,7 +143,7 @@ def load_plan(
 
 
 class Plan:
-    """Jobs and files of a study; it finds paths and settings for the inputs of artifacts."""
+    """Jobs and files of a study; also finds paths and settings for the inputs of artifacts."""
 
     def __init__(self, study: Study, folders: Folders = OF_STUDY) -> None:
         self.study, self.folders, self.results = study, folders, folders.results
@@ -161,7 +161,7 @@ class Plan:
         return {name: figure for name, figure in declarations().items() if self.holds(figure)}
 
     def check(self) -> None:
-        """Check the configuration and files it names, so that faults show before any job starts."""
+        """Check the configuration and the files that it names, before any job starts."""
         settings = self.study.settings
         load_claims(self.study.root / "config" / "claims.yaml", settings.claim_sets)
         for key in ("ladder", "live", "subspace", "scaling", "stability"):
@@ -170,7 +170,7 @@ class Plan:
         check_live(self.study)
         check_texts(self.study)
         scaled_methods(self.study, {})
-        self.fixed  # noqa: B018 : resolving all jobs checks every figure and text
+        self.fixed  # noqa: B018 : computing this property checks every figure and text
 
     @cached_property
     def fixed(self) -> dict[str, list[Job]]:
@@ -189,8 +189,8 @@ class Plan:
     def holds(self, artifact: Artifact) -> bool:
         """Return whether the study has data for ``artifact`` (table, figure, page).
 
-        All but a study with `Study.is_alone` have: their manuscript shows everything. It has none
-        for tables about claims, and where it has no file of the kind that is read first.
+        All studies except those with `Study.is_alone` have data for every artifact. Those lack data
+        for tables about claims, and if they have no file of the kind that is read first.
         """
         if not self.study.is_alone:
             return True
@@ -204,14 +204,14 @@ class Plan:
 
     @property
     def absent(self) -> str:
-        """Text that counts what an own study leaves out; empty for other studies."""
+        """Message that counts the outputs that a user's study leaves out; empty for others."""
         kinds = Counter(name.partition("_")[0] for name in self.left_out)
         told = f"left out: {kinds['picture']} figures, {kinds['table']} tables, the claims and the "
-        return f"{told}hard cases, about scenes of {DEFAULT}" if self.study.is_alone else ""
+        return f"{told}hard cases, which need scenes of {DEFAULT}" if self.study.is_alone else ""
 
     @cached_property
     def left_out(self) -> set[str]:
-        """Outputs of manuscript and article about tables and figures that the study lacks."""
+        """Outputs of manuscript and article that need tables or figures that the study lacks."""
         tables = declared().keys() - self.tables.keys()
         tex = {name for name in TEX_TABLES if tables & {*tables_of(name)}}
         pictures = {f"picture_{name}" for name in declarations().keys() - self.figures.keys()}
@@ -234,7 +234,7 @@ class Plan:
         own = {name: labels[name] for name in artifact.labels}
         key = (artifact.rule, *own.values())
         if key not in self._jobs:
-            known = {**own, "figure": artifact.name}  # figures find what they draw by it
+            known = {**own, "figure": artifact.name}  # the name selects the figure's scenes
             settings = artifact.settings(self, known)
             inputs = {k: read.paths(self, known) for k, read in artifact.files.items()}
             content = artifact.paths(inputs, edited=True)
@@ -253,12 +253,12 @@ class Plan:
             )
         return self._jobs[key]
 
-    # Methods of the protocol `Sources`, with which declared inputs find their paths and values:
+    # Declared inputs (`Sources`) find their paths and values by the following methods.
 
     def file(self, place: Place, labels: Labels) -> str:
-        """Path that the pattern of ``place`` gives for the scene, group ... in ``labels``.
+        """Return the path of the file of the kind ``place`` for scene, group ... in ``labels``.
 
-        If ``labels`` lack mesh or basis, the scene's mesh and the method's basis are taken.
+        If ``labels`` lack mesh or basis, use the scene's mesh and the method's basis.
         """
         found = dict(labels)
         if "mesh" in place.labels and "mesh" not in found:
@@ -268,7 +268,7 @@ class Plan:
         return place.at(self.results, **{name: found[name] for name in place.labels})
 
     def files(self, place: Place, labels: Labels) -> list[str]:
-        """All paths of the study of the kind ``place`` whose labels agree with ``labels``."""
+        """Return the study's paths of the kind ``place`` whose labels agree with ``labels``."""
         study = self.study.only(labels["scene"]) if "scene" in labels else self.study
         if place in (TABLE, FIGURE, FIGURE_PICTURE):
             names: Iterable[str] = self.tables if place == TABLE else self.figures
@@ -282,13 +282,13 @@ class Plan:
         ]
 
     def table(self, name: str) -> Paths:
-        """Path of table ``name``, [] if the study lacks it; ConfigurationError if none has it."""
+        """Return the path of a table, [] if the study lacks it; ConfigurationError if unknown."""
         if name not in declared():
             raise ConfigurationError(f"'{name}': unknown{choices(name, declared())}")
         return TABLE.at(self.results, name=name) if self.holds(declared()[name]) else []
 
     def value(self, key: str, labels: Labels) -> Any:
-        """Value of setting ``key`` ("a.b"), configured or computed (`DERIVED`; "made": rules)."""
+        """Return setting ``key`` ("a.b"), configured or computed (`DERIVED`; "made": rules)."""
         head, *parts = key.split(".")
         if head == "made":
             pages = [live_page.name] if self.holds(live_page) else []

@@ -1,7 +1,7 @@
-"""Load libraries before the fork server forks jobs; an import of this module does so.
+"""Load libraries before the fork server forks jobs; the import of this module loads them.
 
-These are libraries that most jobs or all figures use, modules that every job imports first, and the
-modules of the experiment with the most jobs.
+They are the libraries that most jobs or all figures use, the modules that every job imports, and
+the modules of the experiment with the most jobs.
 """
 
 import gc
@@ -17,11 +17,11 @@ LIBRARIES = (
     "snakemake.cli", "snakemake.iocontainers", "snakemake.script", "threadpoolctl", "yaml",
 )  # fmt: skip
 
-os.setpgid(0, 0)  # keys such as Ctrl-C are for the run
+os.setpgid(0, 0)  # the run handles keys such as Ctrl-C; this process must not receive them
 import_planned()
 for library in LIBRARIES:
     import_module(library)
-# register numba's own functions once, which otherwise every fork would do
+# register the functions of numba here, or else every fork would do so
 target = import_module("numba.core.registry").cpu_target
 target.typing_context.refresh()
 target.target_context.refresh()

@@ -1,4 +1,4 @@
-"""Rules of the Snakemake workflow, one for each artifact (function declared to make files)."""
+"""Make the rules of the Snakemake workflow, one for each artifact (function that makes files)."""
 
 from collections.abc import Callable, Iterator
 from operator import attrgetter
@@ -9,7 +9,7 @@ from study.artifact.text import to_plain
 from study.experiments.kit.base import Experiment
 from study.pipeline.plan import Job, Plan
 
-# Kind of job -> name of an output -> its chapter in the report; browsers display a PNG, no PDF.
+# Kind of job -> name of an output -> its chapter in the report, which shows figures as PNG.
 SHOWN = {
     "tables": {"table": "Tables"},
     "figures": {"png": "Figures"},
@@ -34,7 +34,7 @@ def rules(plan: Plan, cores: int) -> Iterator[SimpleNamespace]:
 
 
 def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespace:
-    """Rule of the jobs of ``experiment``, one for each combination of its labels."""
+    """Return the rule of ``experiment``; it has a job for each combination of its labels."""
 
     def of(value: Callable[[Job], Any]) -> Callable[[Any], Any]:
         return lambda wildcards: value(plan.job(experiment, wildcards))
@@ -50,21 +50,21 @@ def _experiment(plan: Plan, experiment: Experiment, cores: int) -> SimpleNamespa
         input={name: paths(name) for name in experiment.files},
         output={name: f"{plan.results}/{place.pattern}" for name, place in outputs},
         log=f"{plan.results}/logs/{experiment.rule}{'/' if labels else ''}{labels}.log",
-        # on a cluster, a scene's jobs form a batch; those that measure times or lack a scene do not
+        # on a cluster, jobs of a scene form a batch, except those that measure times
         group=None if alone or "scene" not in experiment.labels else "scene",
         threads=cores if alone else 1,
         # a job that measures times gets a whole node of a cluster
         resources={"slurm_extra": "--exclusive"} if alone else {},
         params={"artifact": experiment.address, **{n: of(attrgetter(n)) for n in PARAMETERS}},
-        message=f"{title} (alone on the machine)" if alone else title,
+        message=f"{title} (no other job meanwhile)" if alone else title,
         shown={},
     )
 
 
 def _fixed(plan: Plan, job: Job, folder: str) -> SimpleNamespace:
-    """Snakemake rule of ``job``, the only one of its artifact, with its log in logs/``folder``."""
+    """Return the rule of ``job``, the only job of its artifact; its log is in logs/``folder``."""
     artifact, outputs = job.artifact, job.outputs
-    # the inputs of the manuscript have names of documents, too
+    # the outputs of `paper_inputs` have the same names as documents but are not shown
     chapters = {} if artifact.name == "paper_inputs" else SHOWN[folder]
     labels = {"name": artifact.name, "title": to_plain(artifact.title)}
     return SimpleNamespace(

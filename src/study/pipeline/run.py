@@ -1,4 +1,4 @@
-"""First and last steps of a run of the workflow, by ``./reproduce`` or by ``snakemake``."""
+"""Begin and end a run of the workflow, which ``./reproduce`` or ``snakemake`` has started."""
 
 import atexit
 import json
@@ -34,7 +34,7 @@ from study.pipeline.unfit import MISSING, UNUSUAL, faults, force
 def expected_seconds(plan: Plan) -> Callable[[str], float]:
     """Return a function that maps the path of a job's log to its expected processor seconds.
 
-    They are the mean of measured jobs of the same kind, without any the median of all kinds.
+    They are the mean over measured jobs of this kind, or else the median over all kinds.
     """
     full = plan.study.settings.coarsen == Coarsen()
     table = read_table(plan.study.root / COSTS, COLUMNS, result=False)
@@ -45,7 +45,7 @@ def expected_seconds(plan: Plan) -> Callable[[str], float]:
 
 
 def expected_work(workflow: Any, plan: Plan) -> dict[int, float]:
-    """Map the number of each job that ``workflow`` runs to its expected seconds, times its cores.
+    """Map the number of each job that ``workflow`` runs to its expected seconds times its cores.
 
     Rules without a log only collect targets and take no time.
     """
@@ -55,10 +55,10 @@ def expected_work(workflow: Any, plan: Plan) -> dict[int, float]:
 
 
 class Run:
-    """Run of the workflow in this process: its lock on the folder, fork server, last messages."""
+    """A run of the workflow in this process: lock of the folder, fork server, last messages."""
 
     def __init__(self) -> None:
-        """Lock the working directory, or end the process if it is locked; not if no job runs."""
+        """Lock the working directory if jobs will run; end the process if it is locked already."""
         handle(leave)
         JobScheduler.exit_gracefully = staticmethod(leave)
         with one_line():
@@ -71,10 +71,10 @@ class Run:
         logging.getLogger("snakemake.logging").addHandler(self.failures)
 
     def check(self, plan: Plan, workflow: Any, cores: int) -> None:
-        """Check that requested targets can be made; let a dry run say how long it would take.
+        """Check that requested targets can be made; a dry run also prints the expected time.
 
-        Results that do not fit ``plan`` (see `faults`) are made again; a run sets those aside that
-        are damaged or another's. Raises ConfigurationError if a target cannot be made.
+        Results that do not fit ``plan`` (see `faults`) are made again; a run first renames those
+        that are damaged or copied. Raises ConfigurationError if a target cannot be made.
         """
         check_targets(plan, self.command.targets, list(workflow.rules))
         found = faults(plan, self.command.targets) if self.command.makes else {}
@@ -94,13 +94,13 @@ class Run:
 
     def start(self, workflow: Any, plan: Plan) -> None:
         """Log the expected times of jobs, and start the fork server if jobs run on this machine."""
-        # With a limit on the rate of starts, each selection of jobs starts a timer, which selects
-        # again: at the end of a run, timers use a third of a core, and the process waits for them.
+        # If Snakemake limits the rate of starts, each selection of jobs starts a timer, which
+        # selects again: these timers use a third of a core, and the process waits until they end.
         workflow.scheduler.job_rate_limiter = None
-        memory().save()  # a signal ends a run at once
+        memory().save()  # save now, because a signal may end the run at any time
         expected = expected_work(workflow, plan)
         logging.getLogger("snakemake.logging").info(
-            f"Jobs take {sum(expected.values()):.0f} s on one core where they were measured.",
+            f"Jobs took {sum(expected.values()):.0f} s on one core of the machine that timed them.",
             extra={"expected": expected},
         )
         with one_line():
@@ -109,10 +109,10 @@ class Run:
         if workflow.local_exec:
             start_server()
         else:
-            handle(signal.default_int_handler)  # Snakemake then cancels its jobs
+            handle(signal.default_int_handler)  # with this handler, Snakemake cancels its jobs
 
     def succeed(self, plan: Plan) -> None:
-        """End a successful run: write overview and manifest; print the summary as last output."""
+        """End a successful run: write overview and manifest, and print the summary."""
         handle(leave)
         try:
             if not self.command.targets:
@@ -123,12 +123,12 @@ class Run:
         atexit.register(sys.stderr.write, summary(self.command, plan))
 
     def fail(self) -> None:
-        """End a failed run: print the causes as last output."""
+        """End a failed run: print the causes of the failures."""
         atexit.register(sys.stderr.write, self.failures.text())
 
 
 def start_batch(workflow: Any) -> None:
     """Start the fork server for a batch of jobs, if ``workflow`` runs on a node of a cluster."""
-    # Snakemake runs twice there: a first process, which runs no job, hands on the batch
+    # Snakemake runs twice on a node: the first process runs no job and only starts the second
     if workflow.remote_exec and "slurm-jobstep" not in sys.argv:
         start_server()

@@ -1,7 +1,7 @@
-"""The lock of a run on its folder.
+"""Lock the folder of a run, so that no second run starts there.
 
-Snakemake's own lock consists of files, which a killed run leaves behind: a process that has the
-operating system's lock deletes them.
+The operating system releases this lock when the process ends. Snakemake's lock consists of files,
+which a killed run leaves behind; the next run deletes them.
 """
 
 import fcntl
@@ -32,8 +32,8 @@ def hold() -> int:
         holder = os.read(descriptor, 300).decode(errors="replace").strip()
         os.close(descriptor)
         raise PdromError(
-            f"another run ({holder or 'just started'}) is at work in this folder; wait for its "
-            "end, -n works meanwhile"
+            f"another run ({holder or 'just started'}) uses this folder; wait until it ends "
+            "(-n works meanwhile)"
         ) from None
     os.ftruncate(descriptor, 0)
     os.write(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode())

@@ -1,4 +1,4 @@
-"""Scenes of config/scenes, with the changes that a study configures, checked by building them."""
+"""Read scenes from config/scenes, change them as a study configures, and check that they build."""
 
 import io
 import logging
@@ -45,7 +45,7 @@ def scene_names(root: Path) -> list[str]:
 
 
 def require_scenes(root: Path, names: Iterable[str], key: str) -> None:
-    """Raise ConfigurationError, with ``key`` in its text, if a scene in ``names`` has no file."""
+    """Raise ConfigurationError, which names ``key``, if a scene in ``names`` has no file."""
     known = scene_names(root)
     for name in names:
         if name not in known:
@@ -57,8 +57,8 @@ def checked_scene(
 ) -> tuple[SceneConfig, tuple[int, int]]:
     """Check scene ``name`` below ``root`` by building it, and log its warnings.
 
-    It is not built if an earlier command has built it by the same code from the same files, under
-    the same limits of meshes. Returns its configuration and its numbers of vertices and elements.
+    The scene is not built again if an earlier command has built it with equal code, files and
+    limits of meshes. Returns its configuration and its numbers of vertices and elements.
     """
     config, own = read_scene(root, name, coarsen), io.StringIO()
 
@@ -74,7 +74,7 @@ def checked_scene(
             mesh = f"{digest_of(file)} {os.environ.get(VARIABLE)}"
     code = fingerprint(__name__, *sorted({*modules_in(config)}))
     vertices, elements, texts = memory().get(build, code, config.model_dump_json(), mesh)
-    for text in texts if not own.getvalue() else ():  # `build` has logged them already
+    for text in texts if not own.getvalue() else ():  # `build` logs them if it is called
         logging.getLogger(__name__).warning("%s", text)
     return config, (vertices, elements)
 
@@ -85,7 +85,7 @@ def load_bound_scene(root: Path, name: str, coarsen: Coarsen = UNCHANGED) -> Sce
     try:
         mesh = scene.mesh.build(root)
         bound = Scene.build(scene, mesh)
-        # the held-out variant has the constraint groups built above: build its other effects only
+        # the scene of the test trajectory has the same constraint groups: build its other effects
         heldout = scene.heldout_variant()
         other = tuple(e for e in heldout.effects if not isinstance(e, GroupConfig))
         Scene.build(heldout.model_copy(update={"effects": other}), mesh)
@@ -105,8 +105,8 @@ def read_scene(root: Path, name: str, coarsen: Coarsen = UNCHANGED) -> SceneConf
     path = scene_file(root, name)
     scene = validate(SceneConfig, named(read_yaml(path), name), str(path))
     if scene.name != name:
-        raise ConfigurationError(f"{path}: name = '{scene.name}', required: '{name}', as the file")
-    _ = scene.count  # the study's scenes have a number of iterations
+        raise ConfigurationError(f"{path}: name = '{scene.name}', required: '{name}' (file name)")
+    _ = scene.count  # raises an error if the scene has no number of iterations
     if isinstance(scene.mesh, MeshFile):
         folder = path.parent.relative_to(root).as_posix()
         scene = scene.model_copy(update={"mesh": scene.mesh.below(folder)})

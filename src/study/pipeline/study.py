@@ -1,4 +1,4 @@
-"""The study: scenes, methods and settings of one configuration, and the files it makes.
+"""Check the scenes, methods and settings of a configuration, and list the files that it makes.
 
 Most kinds of files exist for every scene, constraint group and method of the study. Kinds of files
 that exist only for some of these are listed at the end of the module.
@@ -40,9 +40,8 @@ from study.pipeline.folders import DEFAULT
 class StudySettings(ConfigModel):
     """Content of config/default.yaml, with changes by ``--configfile`` and ``--config``.
 
-    The type of a section, with its default values, is declared in the module of the experiment
-    that it configures. Defaults of keys without a section are declared here. The key ``study``
-    names the folder of the results.
+    The module of an experiment declares the type and the default values of its section. Defaults of
+    keys without a section are declared here. The key ``study`` names the folder of the results.
     """
 
     scenes: Annotated[tuple[SceneName, ...], Field(min_length=1)]
@@ -66,14 +65,14 @@ class StudySettings(ConfigModel):
     online: Online = Online()
     live: Live = Live()
     alternatives: Alternatives = Alternatives()
-    recorded: bool = True  # whether tables also get stored results of config/extended.yaml
+    recorded: bool = True  # True: tables also get stored results of config/extended.yaml
     study: str | None = None
 
     @model_validator(mode="after")
     def _given_once(self) -> Self:
         for key, values in self:
             if isinstance(values, tuple) and len(set(values)) < len(values):
-                raise ValueError(f"{key} = {list(values)}: an entry is given twice")
+                raise ValueError(f"{key} = {list(values)}: an entry occurs twice; remove one")
         return self
 
 
@@ -98,14 +97,14 @@ class Study:
         self.sizes: dict[str, tuple[int, int]] = {}  # scene -> numbers of vertices and elements
         self._known: dict[str, SceneConfig] = {}
         self.scenes = {name: self.scene(name) for name in settings.scenes}
-        # an own study runs no large scenes of the full study
+        # a user's study (`is_alone`) runs no large scenes of the full study
         others = {*self._full.online.scenes} if self.is_alone else ()
         online = [name for name in settings.online.scenes if name not in others]
         self.online = {name: self.scene(name) for name in online}
         self.methods: dict[str, MethodSpec] = self.named_methods(settings.methods, "methods")
 
     def value(self, key: str) -> Any:
-        """Value of a dotted ``key`` of the configuration; ConfigurationError if there is none."""
+        """Return the value of a dotted ``key``; ConfigurationError if the key does not exist."""
         return part_of(self.settings, key.split("."), key)
 
     @cached_property
@@ -114,9 +113,9 @@ class Study:
         return load_methods(self.root / "config" / "methods.yaml")
 
     def scene(self, name: str) -> SceneConfig:
-        """Return any scene by ``name``, in the study or not; its title is replaced by its name.
+        """Return any scene by ``name``, in the study or not, with its name in place of its title.
 
-        Jobs then do not depend on titles, which tables and figures read from `titles`. Raises
+        So jobs do not depend on titles, which tables and figures read from `titles`. Raises
         ConfigurationError if the file of the scene is missing or faulty.
         """
         if name not in self._known:
@@ -145,12 +144,12 @@ class Study:
 
     @property
     def is_own(self) -> bool:
-        """Whether the study has no scene in common with config/default.yaml."""
+        """Whether this is a user's own study, without any scene of config/default.yaml."""
         return not {*self.settings.scenes} & {*self._full.scenes}
 
     @property
     def is_alone(self) -> bool:
-        """Whether an own study leaves out what concerns others' scenes: it decides no claims."""
+        """Whether this is a user's study that decides no claims and leaves out the full study."""
         return self.is_own and not self.settings.claim_sets
 
     @property
@@ -168,12 +167,12 @@ class Study:
         return {scene.mesh.identifier: scene.mesh for scene in self.scenes.values()}
 
     def mesh(self, identifier: str) -> MeshConfig:
-        """Configuration of mesh ``identifier``, which a scene of config/scenes or the study has."""
+        """Return the configuration of a mesh, used by a scene of the study or of config/scenes."""
         return self.meshes.get(identifier) or self.every_mesh[identifier]
 
     @cached_property
     def every_mesh(self) -> dict[str, MeshConfig]:
-        """Identifier -> configuration, for meshes of scenes in config/scenes and in the study."""
+        """Identifier -> configuration, for meshes of all scenes in config/scenes or the study."""
         names = scene_kit.scene_names(self.root)
         meshes = [
             scene_kit.read_scene(self.root, name, self.settings.coarsen).mesh for name in names
@@ -181,12 +180,12 @@ class Study:
         return {mesh.identifier: mesh for mesh in meshes} | self.meshes
 
     def basis(self, identifier: str) -> BasisSpec:
-        """Specification of the basis ``identifier``, from the first method that uses it."""
+        """Return the specification of a basis, taken from the first method that uses it."""
         method = next(m for m in self.methods.values() if m.basis_id == identifier)
         return BasisSpec(**{key: getattr(method, key) for key in BasisSpec.model_fields})
 
     def named_methods(self, names: Iterable[str], key: str) -> dict[str, MethodSpec]:
-        """Map ``names``, which ``key`` lists, to methods; ConfigurationError for an unknown one."""
+        """Map ``names``, which ``key`` lists, to methods; ConfigurationError if one is unknown."""
         known = self.every_method
         for name in names:
             if name not in known:
@@ -195,11 +194,11 @@ class Study:
 
 
 def part_of(value: Any, parts: Iterable[str], key: str) -> Any:
-    """Attribute ``value.a.b`` for ``parts`` ("a", "b"); ConfigurationError if it is missing."""
+    """Return ``value.a.b`` for ``parts`` ("a", "b"); ConfigurationError if it does not exist."""
     for part in parts:
         if not hasattr(value, part):
             known = choices(part, getattr(type(value), "model_fields", ()))
-            raise ConfigurationError(f"the key '{key}': unknown{known}")
+            raise ConfigurationError(f"key '{key}': unknown{known}")
         value = getattr(value, part)
     return value
 
@@ -208,7 +207,7 @@ Labels = dict[str, str]
 
 
 def labels_of(study: Study, place: paths.Place) -> list[Labels]:
-    """Labels (scene, group ...) of every file of the study with the pattern of ``place``."""
+    """Return the labels (scene, group ...) of every file of the kind ``place`` in the study."""
     names = place.labels
     scenes = SCENES[place](study) if place in SCENES else study.scenes
     known: Iterable[Labels] = [{}]
@@ -233,12 +232,12 @@ def labels_of(study: Study, place: paths.Place) -> list[Labels]:
 
 
 def _held(study: Study, listed: Iterable[str]) -> list[str]:
-    """Scenes of the study that are also in ``listed``, in the order of the study."""
+    """Return the scenes of the study that are also in ``listed``, in the order of the study."""
     return [scene for scene in study.scenes if scene in {*listed}]
 
 
 def _with_subspaces(study: Study) -> list[str]:
-    """Scenes with models in position subspaces: configured ones, else all that allow them."""
+    """Return the scenes with position subspaces: the configured ones, or else all suitable ones."""
     section = study.settings.subspace
     if not (section.bases and section.sizes):
         return []
@@ -246,12 +245,12 @@ def _with_subspaces(study: Study) -> list[str]:
     return _held(study, section.scenes or takes)
 
 
-# Kinds of files with results of reduced models whose vertex positions lie in a subspace.
+# Kinds of files about reduced models whose vertex positions lie in a subspace.
 MODELS = (
     paths.SUBSPACES, paths.SUBSPACES_TRAIN, paths.SUBSPACES_HELDOUT, paths.SUBSPACES_SECONDS,
 )  # fmt: skip
-# Kind of file -> function that returns the scenes for which a study makes it; for files of several
-# mesh sizes, a mapping scene -> factors that multiply the number of vertices along a mesh's side.
+# Kind of file -> function that returns the scenes for which a study makes the file. If it exists
+# for several mesh sizes, a mapping scene -> factors of the number of vertices along a mesh's side.
 SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
     **dict.fromkeys((*MODELS, paths.ERROR_BUDGET), _with_subspaces),
     paths.SCALING: lambda study: study.settings.scaling.scenes,
@@ -268,7 +267,7 @@ SCENES: dict[paths.Place, Callable[[Study], Iterable[str]]] = {
     ],
     paths.STABILITY: lambda study: _held(study, study.settings.stability.scenes),
 }
-# Kind of file -> function that tells whether a study makes it for a scene and a reduced group.
+# Kind of file -> function that returns whether a study makes the file for a scene and a group.
 GROUPS: dict[paths.Place, Callable[[Study, str, str], bool]] = {
     paths.REPETITIONS: lambda study, scene, group: any(
         scene in cell.scenes for cell in study.settings.repetitions.cells

@@ -1,7 +1,7 @@
-"""Texts about a finished run: the last lines it prints, and the overview results/contents.md.
+"""Describe a finished run: the last lines that it prints, and the overview results/contents.md.
 
-The overview lists every figure and table, and the manuscript, with the command line that makes it.
-The columns of the tables follow.
+The overview lists all figures, tables and the manuscript with the commands that make them, and
+describes all columns of the tables.
 """
 
 import shlex
@@ -25,29 +25,29 @@ HEAD = """\
 # Contents
 
 Written by the run of {configuration}.
-With `-n`, a command says how many jobs and minutes an entry needs.
+Add `-n` to a command to see how many jobs and minutes it would take.
 
 | kind | name | command |
 |---|---|---|
 {entries}
 # Tables
 
-Tables are CSV with one row per observation, SI units unless a unit says otherwise, and an empty
-cell where there is no value.
-A column marked "timed" depends on timing or on the memory in use: only there may two runs on one
-machine differ (in `claims`, only in claims about times).
-"Compared as" is the kind for which `./reproduce verify` has a tolerance, followed by the column's
-own tolerance if it has one (docs/verification.md).
+Tables are CSV files with one row for each observation. An empty cell has no value. Units are SI
+units unless the column "unit" says otherwise.
+Two runs on one machine can differ only in columns marked "timed", which depend on measured times
+or on the memory in use (in the table `claims`, only in claims about times).
+"Compared as" is the kind by which `./reproduce verify` compares the cells, and the tolerance of
+the column if it is not that of the kind (docs/verification.md).
 """
 CONTENTS = paths.Place("contents.md")
 
 
 def processor_seconds() -> float:
-    """Processor seconds used until now by this process and its child processes."""
+    """Return the processor seconds that this process and its child processes have used so far."""
     own, total = psutil.Process(), 0.0
     for process in (own, *own.children(recursive=True)):
         with suppress(psutil.Error):  # the child may have ended since the list was made
-            total += sum(process.cpu_times()[:4])  # also of its ended child processes
+            total += sum(process.cpu_times()[:4])  # includes times of its ended child processes
     return total
 
 
@@ -60,13 +60,13 @@ def summary(command: CommandLine, plan: Plan) -> str:
         lines.append(f"made: {', '.join(command.targets)}")
     else:
         claims = paths.TABLE.at(folders.results, name="claims")
-        # a damaged file is only left out here: the next run makes it again
+        # leave out a damaged file: the next run makes it again
         if Path(claims).is_file() and check_file(claims) is Condition.INTACT:
             rows = read_table(claims).itertuples()
             said = [f"{row.claim} {row.verdict} / {row.verdict_beyond}" for row in rows]
-            lines.append(f"verdicts (as published / beyond): {', '.join(said)}")
+            lines.append(f"verdicts (as published / improved): {', '.join(said)}")
         lines.append(f"manuscript: {', '.join(folders.documents.values())}")
-        lines.append(f"as pages: {paths.ARTICLE.at(folders.results, name='index.html')}")
+        lines.append(f"web pages: {paths.ARTICLE.at(folders.results, name='index.html')}")
         for kind in ("figures", "tables"):
             lines.append(f"{kind}: {len(plan.fixed[kind])} in {folders.results}/{kind}")
         if absent := plan.absent:
@@ -78,19 +78,19 @@ def summary(command: CommandLine, plan: Plan) -> str:
 
 
 def minutes(seconds: float) -> str:
-    """Duration of ``seconds`` as text in minutes and seconds."""
+    """Return the duration ``seconds`` as text in minutes and seconds."""
     whole = round(seconds)
     return f"{whole // 60} min {whole % 60} s" if whole >= 60 else f"{whole} s"
 
 
 def configuration(command: CommandLine) -> str:
-    """Names of the configuration files and settings of ``command``, in one line."""
+    """Return the configuration files and settings of ``command`` in one line."""
     names = command.configfiles or ("config/default.yaml",)
     return ", ".join([*names, *command.settings])
 
 
 def _section(table: Table) -> str:
-    """Markdown text that describes a table and its columns."""
+    """Describe a table and its columns in Markdown."""
     lines = [
         f"## {table.name}",
         "",
@@ -115,7 +115,7 @@ def contents(command: CommandLine, plan: Plan) -> str:
         for name, figure in plan.figures.items()
     ]
     for name in plan.tables:
-        # a name that a table and a figure share would request both: request this table by its path
+        # if a figure has the name of this table, the name would request both: give the path
         path = paths.TABLE.at(paths.RESULTS, name=name)
         entries.append(("table", name, (path if name in declarations() else name,)))
     entries.append(("manuscript", Folders().manuscript, ()))

@@ -1,4 +1,4 @@
-"""Targets (results requested on the command line): translation to paths of files, and checks.
+"""Find the files of targets, which are the results that a command line requests.
 
 A target is the number or name of a figure, the name of a table or of a rule, or a path.
 """
@@ -28,15 +28,15 @@ def figure_file(word: str) -> str:
     known |= {f"{PREPRINT}{f.number}": name for name, f in figures.items() if f.number}
     known |= {name: name for name in figures}
     if word not in known:
-        raise ConfigurationError(f"figure '{word}': there is none{choices(word, known)}")
+        raise ConfigurationError(f"figure '{word}': unknown{choices(word, known)}")
     return paths.FIGURE.at(paths.RESULTS, name=known[word])
 
 
 def files(target: str, folders: Folders) -> list[str]:
     """Return the paths in ``folders`` for a ``target``: the name of a figure or table, or a path.
 
-    A path below ``results`` becomes a path in the results folder of this study. A name stands for
-    figure and table if both have it.
+    A path below ``results`` becomes a path in the results folder of this study. If a figure and a
+    table have the same name, the name stands for both.
     """
     kinds = ((paths.FIGURE, declarations()), (paths.TABLE, declared()))
     found = [place.at(folders.results, name=target) for place, names in kinds if target in names]
@@ -53,6 +53,6 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Iterable[Any]) -> N
         if not any(target == rule.name or rule.is_producer(target) for rule in rules):
             known = [*plan.own_files, *plan.figures, *plan.tables, *(rule.name for rule in rules)]
             raise ConfigurationError(
-                f"target '{target}': nothing makes it in this study{suggestion(target, known)}; "
-                "targets are files, and names of figures and tables"
+                f"target '{target}': this study does not make it{suggestion(target, known)}; "
+                "a target is a file, or the name of a figure or table"
             )

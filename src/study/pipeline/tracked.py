@@ -1,13 +1,13 @@
-"""Update of results stored in git, from finished studies in ``results``.
+"""Update results that are stored in git, from finished studies in ``results``.
 
 ``./reproduce run python -m study.pipeline.tracked WORD`` updates, for each WORD:
 
 costs : `config/reference/job_costs.csv` from the logs of the full and of the tiny study: for each
-    kind of job, the mean processor seconds in both, and the longest time and largest memory, which
-    the requests of `workflow/profiles/slurm` must cover
-frozen : the fingerprint of the code, the rules and the scenes of ``config/replication.yaml``
-replication : the recorded verdicts of ``config/replication.yaml``, if that is as it was frozen
-rows : tables of ``config/extended.yaml`` that other studies show, too; makes them first
+    kind of job, its mean processor seconds in each of the two studies, and its longest time and
+    largest memory, which the requests of `workflow/profiles/slurm` must cover
+frozen : fingerprint of the code, and of the rules and scenes of ``config/replication.yaml``
+replication : verdicts of ``config/replication.yaml``; refused if this fingerprint has changed
+rows : tables of ``config/extended.yaml`` that other studies show, too; they are computed first
 """
 
 import argparse
@@ -47,12 +47,12 @@ MADE = "config/reference/recorded/made.csv"
 
 
 def kind_of(log: str, results: str) -> str:
-    """Kind of a job: first part of the path of its ``log`` below the folder ``results``/logs."""
+    """Return the kind of a job: first part of the path of its ``log`` in ``results``/logs."""
     return Path(log).relative_to(Path(results, "logs")).parts[0].removesuffix(".log")
 
 
 def costs(results: str, coarse: str) -> pd.DataFrame:
-    """Return columns `COLUMNS` of each kind of job, from logs of a full and a ``coarse`` study."""
+    """Return a table with `COLUMNS`, from the logs of a full study and of a ``coarse`` study."""
 
     def used(folder: str) -> Any:
         logs = {str(log): usage_of(log) for log in sorted(Path(folder, "logs").rglob("*.log"))}
@@ -66,13 +66,13 @@ def costs(results: str, coarse: str) -> pd.DataFrame:
 
 
 def verdicts(claims: Path) -> pd.DataFrame:
-    """Return what the table ``claims`` says, with its date and the fingerprints of its rules."""
+    """Return the verdicts in the table ``claims``, its date, and the fingerprints of its rules."""
     table, rules = dated(claims, "date")[["claim", *MEASURED, "date"]], load_claims(Path(RULES))
     return table.assign(rules=[rules[claim].fingerprint for claim in table.claim])
 
 
 def code_of_replication() -> str:
-    """Two fingerprints: of all code, and of rules, settings and scenes of the study `OTHERS`."""
+    """Return fingerprints of all code, and of rules, settings and scenes of the study `OTHERS`."""
     scenes = [read_scene(Path(), name) for name in read_yaml(Path(OTHERS))["scenes"]]
     files = [f"config/{name}.yaml" for name in ("default", "methods", "claims", "replication")]
     files += [f"config/scenes/{scene.name}.yaml" for scene in scenes]
@@ -81,9 +81,10 @@ def code_of_replication() -> str:
 
 
 def replication(claims: Path | None) -> dict[str, pd.DataFrame]:
-    """Map the files of the last replication to their content, with the verdicts in ``claims``.
+    """Map files about the last replication to their content, with the verdicts in ``claims``.
 
-    Without ``claims`` it is frozen. Raises ConfigurationError if code, rules or scenes changed.
+    If ``claims`` is None, record fingerprints only. Otherwise, raise ConfigurationError if they
+    show that code, rules or scenes have changed since.
     """
     commits, code = pd.read_csv(COMMITS, dtype=str), code_of_replication()
     last, name = commits.index[-1], commits.replication.iloc[-1]
@@ -91,14 +92,14 @@ def replication(claims: Path | None) -> dict[str, pd.DataFrame]:
     if not claims:
         return {COMMITS: commits}
     if (kept := commits.code_frozen[last]) != code:
-        raise ConfigurationError(f"{COMMITS}: {name}: frozen is '{kept}', which now is '{code}'")
+        raise ConfigurationError(f"{COMMITS}: {name}: the frozen code '{kept}' is now '{code}'")
     earlier = pd.read_csv(RECORDED, dtype=str).query("replication != @name")
     found = verdicts(claims).assign(replication=name)
     return {RECORDED: pd.concat([earlier, found]), COMMITS: commits}
 
 
 def dated(path: Path, column: str) -> pd.DataFrame:
-    """Return the table in the file ``path``; a new ``column`` has the day the file was changed."""
+    """Return the table in ``path``, with the day of the file's last change in a new ``column``."""
     day = datetime.fromtimestamp(path.stat().st_mtime, UTC).date().isoformat()
     return read_table(path).assign(**{column: day})
 
@@ -106,7 +107,7 @@ def dated(path: Path, column: str) -> pd.DataFrame:
 def rows(results: str) -> dict[str, pd.DataFrame]:
     """Map the files of recorded rows, and `MADE`, to their content from the long study."""
     tables = {n: dated(Path(TABLE.at(results, name=n)), "recorded") for n in KEPT}
-    runs = tables[alternatives.name]  # validation motions have chosen models: `frontier`
+    runs = tables[alternatives.name]  # drop validation trajectories: `frontier` has used them
     tables[alternatives.name] = runs[runs.motion.isin(MOTIONS)]
     made = {MADE: pd.DataFrame({"code": [code_of_rows()]})}
     return made | {
@@ -115,7 +116,7 @@ def rows(results: str) -> dict[str, pd.DataFrame]:
 
 
 def code_of_rows() -> str:
-    """Fingerprint of the code on which jobs of `KEPT` depend in the long study `LONG`."""
+    """Return the fingerprint of the code that makes the tables `KEPT` in the study `LONG`."""
     scenes = read_yaml(Path(LONG))[alternatives.name]["scenes"]
     effects = {place for name in scenes for place in read_scene(Path(), name).modules}
     return fingerprint(alternatives.function.__module__, *sorted(effects))[:16]
@@ -126,11 +127,11 @@ def outdated_rows() -> str | None:
     if pd.read_csv(MADE, dtype=str).code[0] == code_of_rows():
         return None
     again = "./reproduce run python -m study.pipeline.tracked rows"
-    return f"warning: {MADE}: the code is newer than the recorded rows; make them by {again}"
+    return f"warning: {MADE}: the code is newer than the recorded rows; update them by {again}"
 
 
 def updated(word: str) -> dict[str, pd.DataFrame]:
-    """Map files to their new content, for one of the words."""
+    """Map files to their new content; the docstring of this module explains each ``word``."""
     full, tiny, others, long = (folders([f], []).results for f in (FULL, TINY, OTHERS, LONG))
     match word:
         case "costs":

@@ -1,7 +1,7 @@
-"""Results that a run makes again although Snakemake, which compares dates, would keep them.
+"""Find results that do not fit the plan although Snakemake, which compares dates, would keep them.
 
-A checksum says of which path, settings, code and inputs a result is. Snakemake is told to make
-files again that do not fit the plan, and makes what follows from them.
+A checksum records the path, settings, code and inputs of a result. `force` makes Snakemake compute
+unfit results again, and with them all results that depend on them.
 """
 
 import os
@@ -21,16 +21,16 @@ from study.pipeline.plan import Job, Plan
 
 MISSING = "output is missing"
 DAMAGED = "output is damaged"
-FOREIGN = "output belongs to another result"
+FOREIGN = "output was copied from another result"
 CHANGED = "settings or code have changed"
 STALE = "output was made from other inputs"
-FILES = 20_000  # number of files of which the content of checksums is kept
-# Faults that no edit and no interrupted run explains: a run names every file that has one.
+FILES = 20_000  # largest number of files for which the content of checksums is kept
+# Faults that neither an edit nor an interrupted run causes; a run reports each file with one.
 UNUSUAL = (MISSING, DAMAGED, FOREIGN)
 
 
 class Checked(Memory):
-    """Content of the checksums of results, by path, size, inode and dates of both files.
+    """Cache of the checksums of results, by path, size, inode and dates of result and checksum.
 
     The bytes of a file are compared with its checksum only if one of these has changed.
     """
@@ -39,7 +39,7 @@ class Checked(Memory):
         super().__init__(Path(results, ".checked.json"), FILES)
 
     def told(self, path: str) -> dict[str, str] | None:
-        """Digest and origin that the checksum of ``path`` says: {} if damaged, None if missing."""
+        """Return digest and origin in the checksum of ``path``: {} if damaged, None if missing."""
         state, exists = _state(path)
         told: dict[str, str] | None = self.get(lambda: _read(path), path, state) if exists else None
         return told
@@ -51,19 +51,19 @@ class Checked(Memory):
 
 
 def _state(path: str) -> tuple[str, bool]:
-    """Size, inode and dates of ``path`` and its checksum file as text; whether ``path`` exists."""
+    """Return size, inode, dates of ``path`` and its checksum as text; whether ``path`` exists."""
     found: list[Any] = []
     for each in (path, os.fspath(checksum_path(path))):
         try:
             stat = os.stat(each)
             found.append([stat.st_size, stat.st_ino, stat.st_mtime_ns, stat.st_ctime_ns])
-        except OSError:  # there may be a link that leads nowhere
+        except OSError:  # a broken link counts as existing
             found.append(os.path.lexists(each))
     return str(found), bool(found[0])
 
 
 def _read(path: str) -> dict[str, str]:
-    with suppress(StorageError):  # a folder, a link that leads nowhere, or no permission
+    with suppress(StorageError):  # a folder, a broken link, or no permission
         if check_file(path) is Condition.INTACT and (checksum := read_checksum(path)):
             told = provenance_of(path)
             return {"digest": checksum.digest, **{key: told.get(key, "") for key in ORIGIN}}
@@ -71,9 +71,9 @@ def _read(path: str) -> dict[str, str]:
 
 
 def faults(plan: Plan, targets: Sequence[str] = ()) -> dict[str, str]:
-    """Map files to their faults: all that ``targets``, by default the study, need and are unfit.
+    """Map each unfit file that ``targets`` (by default, the whole study) need to its fault.
 
-    A missing file counts if a file is there that was made from it; Snakemake notices all others.
+    A missing file counts if a file made from it exists; Snakemake notices other missing files.
     """
     jobs, checked = needed(plan, targets), Checked(plan.results)
     told = {path: checked.told(path) for path in jobs}
@@ -81,12 +81,12 @@ def faults(plan: Plan, targets: Sequence[str] = ()) -> dict[str, str]:
     there = [job for path, job in jobs.items() if told[path] is not None]
     used = {path for job in there for path in (*job.files, *job.outputs.values())}
     found: dict[str, str] = {}
-    for path, job in jobs.items():  # inputs stand before what is made from them
+    for path, job in jobs.items():  # inputs come before the files that are made from them
         own, inputs = told[path], [told.get(name) or {} for name in job.results]
         if own:
             expected = job.origin(path, [one.get("digest", "") for one in inputs])
             other = [key for key, value in expected.items() if own[key] != value]
-            if other == ["inputs_sha256"]:  # what inputs made again change, Snakemake makes again
+            if other == ["inputs_sha256"]:  # if inputs are made again, Snakemake repeats this job
                 fault = STALE if all(inputs) and found.keys().isdisjoint(job.results) else ""
             else:
                 foreign = "file" in other and own["file"]
@@ -99,7 +99,7 @@ def faults(plan: Plan, targets: Sequence[str] = ()) -> dict[str, str]:
 
 
 def needed(plan: Plan, targets: Sequence[str] = ()) -> dict[str, Job]:
-    """Map all files that ``targets`` (paths, rules; none: the study) need to jobs, inputs first."""
+    """Map all files that ``targets`` (paths, rules; default: all) need to jobs, inputs first."""
     fixed = [job for jobs in plan.fixed.values() for job in jobs]
     rules = {job.artifact.rule: [*job.outputs.values()] for job in fixed}
     makers = {path: job for job in fixed for path in job.outputs.values()}

@@ -1,11 +1,11 @@
-"""Settings that functions compute from the configuration for a job; `DERIVED` lists their names.
+"""Compute settings of a job from the configuration; `DERIVED` lists their names and functions.
 
 All other settings are keys or sections of the configuration. If a job's function annotates its
 parameter for a section with a base class of the section's class, the job depends only on the
 settings that this base class declares.
 
-Functions in `DERIVED` get ``labels``, a map of "scene", "group" ... to values for the job. For a
-figure it maps "figure" to the figure's name, which selects what it draws.
+Functions in `DERIVED` get ``labels``, which maps "scene", "group" ... to the values of the job. For
+a figure, it maps "figure" to the figure's name, from which its scenes and methods follow.
 """
 
 from collections.abc import Callable, Mapping
@@ -34,19 +34,19 @@ from study.pipeline.folders import DEFAULT
 from study.pipeline.study import Study, labels_of
 from study.tables.kit.results import FAILED, FAR
 
-# Basis that tables with one basis per group show; if no method uses it, that of the first method.
+# Basis in tables with one basis per group; if no method uses it, the basis of the first method.
 USUAL_BASIS = "none-none-vectorised"
 
 
 def _stability(study: Study, labels: Labels) -> Stability:
-    """Settings of the stability experiment, without sizes r for which the study has no samples."""
+    """Return the section ``stability`` without sizes r for which the study has no samples."""
     section = study.settings.stability
     held = tuple(r for r in section.ranks if r in study.settings.ranks)
     return section.model_copy(update={"ranks": held})
 
 
 def _usual_bases(study: Study, labels: Labels) -> list[paths.File]:
-    """One basis file per scene and reduced group: of `USUAL_BASIS`, else of the first basis."""
+    """Return a basis file for each scene and group: of `USUAL_BASIS`, else of the first basis."""
     chosen: dict[tuple[str, str], Labels] = {}
     for held in labels_of(study, paths.BASIS):
         group = (held["scene"], held["group"])
@@ -56,17 +56,17 @@ def _usual_bases(study: Study, labels: Labels) -> list[paths.File]:
 
 
 def _holds(study: Study, place: paths.Place, labels: Labels) -> bool:
-    """Return whether the study makes the file with path pattern ``place`` for these ``labels``."""
+    """Return whether the study makes a file of the kind ``place`` for these ``labels``."""
     return {name: labels[name] for name in place.labels} in labels_of(study, place)
 
 
 def _of_scene(study: Study, place: paths.Place, labels: Labels) -> tuple[OfScene, ...]:
-    """Tuple with the job's scene; empty if the study makes no file of pattern ``place`` for it."""
+    """Return the job's scene in a tuple; () if the study makes no file ``place`` for it."""
     return (OfScene(scene=labels["scene"]),) if _holds(study, place, labels) else ()
 
 
 def _joint_rows(study: Study, labels: Labels) -> tuple[JointRows, ...]:
-    """`JointRows` of the scene's reduced groups; () if the study lacks this scene or `JOINT`."""
+    """Return `JointRows` of the scene's groups; () if the study lacks the scene or `JOINT`."""
     scene = labels["scene"]
     if JOINT not in study.methods or scene not in study.scenes:
         return ()
@@ -81,7 +81,7 @@ def _named(scenes: Mapping[str, SceneConfig]) -> list[NamedScene]:
 
 
 def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
-    """Entries of ``frame_times.subspaces`` (models to time) whose models the study computes."""
+    """Return the entries of ``frame_times.subspaces`` whose models the study computes."""
     held = {labels["scene"] for labels in labels_of(study, paths.SUBSPACES)}
     models = study.settings.subspace
     return tuple(
@@ -92,7 +92,7 @@ def _subspace_cases(study: Study, labels: Labels) -> tuple[SubspaceCase, ...]:
 
 
 def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...]:
-    """Entries of ``frame_times.projections`` (cases to time) whose samples the study computes."""
+    """Return the entries of ``frame_times.projections`` whose samples the study computes."""
     held = labels_of(study, paths.SAMPLING)
     return tuple(
         case
@@ -102,12 +102,12 @@ def _projection_cases(study: Study, labels: Labels) -> tuple[ProjectionCase, ...
 
 
 def scaled_methods(study: Study, labels: Labels) -> dict[str, MethodSpec]:
-    """Name -> method, for methods that are timed on meshes of increasing size."""
+    """Map names to the methods that are timed on meshes of increasing size."""
     return study.named_methods(SCALED, "scaling")
 
 
 def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
-    """Runs to repeat in the job's scene: one entry per method in section ``repetitions``."""
+    """Return the runs to repeat in the job's scene, for each method in ``repetitions``."""
     cells = [c for c in study.settings.repetitions.cells if labels["scene"] in c.scenes]
     return tuple(
         Repeated(method=name, spec=spec, **cell.model_dump(include={*Cell.model_fields}))
@@ -117,7 +117,7 @@ def _repeated(study: Study, labels: Labels) -> tuple[Repeated, ...]:
 
 
 def _drawn(study: Study, labels: Labels) -> Drawn:
-    """Scenes and methods that a figure names, or else those of the study that fit the figure."""
+    """Return the scenes and methods that a figure names, or else those that fit the figure."""
     figure = declarations()[labels["figure"]]
     groups = {*figure.groups.split()}
     fitting = [
@@ -143,7 +143,7 @@ def _drawn(study: Study, labels: Labels) -> Drawn:
 
 
 def _facts(study: Study, labels: Labels) -> Facts:
-    """Contents of the manuscript that are no results: captions, settings, page limits."""
+    """Return the contents of the manuscript besides results: captions, settings, page limits."""
     own = study.is_own
     return Facts(
         captions={
@@ -203,14 +203,14 @@ def _scene(study: Study, name: str) -> dict[str, Any]:
 
 
 def _elements(scene: SceneConfig) -> str:
-    """Return what the constraints of ``scene`` act on; if on several, the largest elements."""
+    """Return the name of the largest elements on which constraints of ``scene`` act."""
     cells = {EFFECTS.load(group).cells for group in scene.groups}
     kinds = {"tetrahedron": "tetrahedra", "triangle": "triangles"}
     return next((words for cell, words in kinds.items() if cell in cells), "springs")
 
 
 DERIVED: dict[str, Callable[[Study, Labels], Any]] = {
-    # recorded rows are about scenes of the full study
+    # recorded rows describe scenes of the full study
     "recorded": lambda study, _: study.settings.recorded and not study.is_alone,
     "scene": lambda study, labels: study.scene(labels["scene"]),
     "title": lambda study, labels: study.titles[study.scene(labels["scene"]).name],

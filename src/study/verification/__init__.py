@@ -1,1 +1,1 @@
-"""``./reproduce verify``: comparison of the last run's results with the expected results."""
+"""Compare the results of the last run with the expected results (``./reproduce verify``)."""

@@ -1,5 +1,5 @@
-"""Commands ``./reproduce verify``, which compares results with expected tables or updates these
-tables, and ``./reproduce bundle``, which writes one archive of the sources and the results."""
+"""Compare results with expected tables, or update these tables (``./reproduce verify``); write one
+archive of the sources and the results (``./reproduce bundle``)."""
 
 import argparse
 import gzip
@@ -27,7 +27,7 @@ from study.verification.compare import LOG, folder_of, note, write_reference
 from study.verification.examine import GOOD, Examination, Line, Outcome
 from study.verification.subject import Status, Subject, options_parser, say, verify_files
 
-EXIT_CODES = "exit codes: 0 all holds; 1 faulty input; 2 not understood; 3 differs; 4 not there"
+EXIT_CODES = "exit codes: 0 as expected, 1 faulty input, 2 unknown option, 3 different, 4 missing"
 PAGE = "verification.md"
 # Largest number of differences that the file `PAGE` lists for one table, figure or claim.
 DIFFERENCES_SHOWN = 20
@@ -36,11 +36,11 @@ DIFFERENCES_SHOWN = 20
 def update(subject: Subject, reason: str) -> Path:
     """Replace the expected tables by those of ``subject`` and log the reason; return their folder.
 
-    Raises ConfigurationError without a reason, StorageError if a run would make a table again.
+    Raises ConfigurationError if the reason is empty, StorageError if a table is not up to date.
     """
     words = " ".join(reason.split())
     if not words:
-        raise ConfigurationError('verify --update: say why, as in --reason "a new method"')
+        raise ConfigurationError('verify --update: add a reason, as in --reason "a new method"')
     examination = Examination(subject)
     tables = {name: examination.found(name) for name in declared()}
     targets = [TABLE.at(subject.results, name=name) for name in tables]
@@ -51,7 +51,7 @@ def update(subject: Subject, reason: str) -> Path:
         write_reference(declared()[name], frame, folder)
     for old in [*folder.glob("*.csv"), *folder.glob("*.csv.xz")]:
         if old.name.partition(".")[0] not in declared():
-            old.unlink()  # delete the expected version of a table that no longer exists
+            old.unlink()  # the study no longer has this table
     here = machine()
     note(folder, words, datetime.now(UTC).date(), f"{here.pdrom} ({here.commit})")
     return folder
@@ -59,12 +59,12 @@ def update(subject: Subject, reason: str) -> Path:
 
 def parser() -> argparse.ArgumentParser:
     made = options_parser(
-        "verify", "Compare the last run's results with the expected ones.", EXIT_CODES
+        "verify", "Compare the results of the last run with the expected results.", EXIT_CODES
     )
     what = made.add_mutually_exclusive_group()
     what.add_argument("--files", action="store_true", help="check that no file has changed")
-    what.add_argument("--update", action="store_true", help="expect the results of the last run")
-    made.add_argument("--reason", default="", help="why --update")
+    what.add_argument("--update", action="store_true", help="replace the expected results by these")
+    made.add_argument("--reason", default="", help=f"reason for --update, written to {LOG}")
     return made
 
 
@@ -75,7 +75,7 @@ def verify(arguments: Sequence[str]) -> Status:
     if asked.files:
         return verify_files(subject)
     if asked.update:
-        say(f"expected tables: {update(subject, asked.reason)}")
+        say(f"updated the expected tables in {update(subject, asked.reason)}")
         return Status.HOLDS
     return verify_tables(subject)
 
@@ -84,13 +84,13 @@ def verify_tables(subject: Subject) -> Status:
     """Compare the tables of ``subject`` with the expected ones; print outcomes and write `PAGE`."""
     folder = folder_of(subject.results)
     if not folder.is_dir():
-        hint = 'write them by ./reproduce verify --update --reason "..."'
+        hint = 'to accept its results, run ./reproduce verify --update --reason "..."'
         raise ConfigurationError(f"{folder}: no expected tables of this configuration; {hint}")
     lines = Examination(subject).lines()
     for line in lines:
         say(str(line))
     written = Path(subject.results) / PAGE
-    about = f"Results in `{subject.results}`, expected ones in `{folder}` (`{LOG}` says why)."
+    about = f"Results: `{subject.results}`; expected tables: `{folder}` (history: `{LOG}`)."
     write_text(page(lines, about), written)
     pages = Path(ARTICLE.at(subject.results, name=INDEX))
     if pages.is_file():
@@ -99,7 +99,7 @@ def verify_tables(subject: Subject) -> Status:
     if subject.plan.study.settings.recorded and (warning := outdated_rows()):
         say(warning)
     say(counted(lines))
-    say(f"page: {written}")
+    say(f"differences: {written}")
     return status_of(lines)
 
 
@@ -111,7 +111,7 @@ def status_of(lines: Iterable[Line]) -> Status:
 
 
 def counted(lines: Sequence[Line]) -> str:
-    """Text that says, for claims, figures and tables, how many have each outcome."""
+    """Count claims, figures and tables by outcome, as text."""
     parts = []
     for kind in dict.fromkeys(line.kind for line in lines):
         own = [line.outcome for line in lines if line.kind == kind]
@@ -121,7 +121,7 @@ def counted(lines: Sequence[Line]) -> str:
 
 
 def page(lines: Sequence[Line], about: str) -> str:
-    """Return a Markdown page: the sentence ``about``, and all ``lines`` with their differences."""
+    """Return a Markdown page of the text ``about`` and all ``lines`` with their differences."""
     parts = [f"# Verification\n\n{about}\nSee `docs/verification.md`.\n\n{counted(lines)}.\n"]
     for line in lines:
         more = len(line.details) - DIFFERENCES_SHOWN
@@ -131,12 +131,12 @@ def page(lines: Sequence[Line], about: str) -> str:
 
 
 ARCHIVE = f"pdrom-{__version__}"
-BUNDLE = """``./reproduce bundle``: one archive of the last commit and, in ``published``, of the
-results. Equal commits and results give equal bytes: files are sorted, and dated as results are."""
+BUNDLE = """Write one archive of the last commit and, in the folder published, of the results. Equal
+commits and results give equal archives, byte for byte."""
 
 
 def bundle(arguments: Sequence[str]) -> Status:
-    """Write the archive if all files of the study are intact, else print which ones are not."""
+    """Write the archive if all files of the study are intact; otherwise print the faults."""
     chosen = options_parser("bundle", BUNDLE).parse_args(arguments)
     subject = Subject.of(chosen.configfile, chosen.config)
     status = verify_files(subject)
@@ -144,7 +144,7 @@ def bundle(arguments: Sequence[str]) -> Status:
         return status
     folder = Path(subject.results)
     names = [*read_manifest(subject.results).files, MANIFEST.pattern]
-    small = {n: folder / n for n in names if not n.endswith(".h5")}  # no HDF5: a run makes it again
+    small = {n: folder / n for n in names if not n.endswith(".h5")}  # a run makes HDF5 files again
     results = {os.path.normpath(f"published/results/{name}"): p for name, p in small.items()}
     target = folder / f"{ARCHIVE}.tar.gz"
     write_archive(Path(), results, target)
@@ -160,7 +160,7 @@ def write_archive(root: Path, results: Mapping[str, Path], target: Path) -> None
     date = int(os.environ.get("SOURCE_DATE_EPOCH", "0"))
     if changed := _git(root, "status", "--porcelain", "--untracked-files=no").decode():
         names = ", ".join(line[3:] for line in changed.splitlines())
-        raise ConfigurationError(f"bundle: changes that are in no commit: {names}; commit them")
+        raise ConfigurationError(f"bundle: uncommitted changes in {names}; commit them first")
     made = io.BytesIO(_git(root, "archive", f"--prefix={ARCHIVE}/", "HEAD"))
     with tarfile.open(fileobj=made, mode="a") as archive:
         for name, path in sorted(results.items()):
@@ -176,7 +176,7 @@ def _git(root: Path, *words: str) -> bytes:
     try:
         return subprocess.run(["git", *words], cwd=root, capture_output=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError) as error:
-        fault = "bundle: git lists the sources, and there is no git or no clone here"
+        fault = "bundle: git cannot list the sources; install git and run this in a clone"
         raise ConfigurationError(fault) from error
 
 

@@ -1,12 +1,12 @@
-"""Comparison of a table with its expected version: rows are matched, then cells are compared.
+"""Compare a table with its expected version: match the rows, then compare their cells.
 
-A stable cell may differ by the tolerance of its column. Rounding errors decide unstable cells: a
-share of them may change, in each column and in each part of its rows. By the same count rule, a
-share of the stable cells may shift, that is, differ by more than a part of their tolerance.
+A stable cell may differ by the tolerance of its column. Rounding errors decide the unstable cells,
+a share of which may change, in each column and in each part of its rows. By the same count rule, a
+share of the stable cells may shift, that is, differ by more than 10 % of their tolerance.
 
-Expected tables are kept in git below ``results/reference``, without columns that are never compared
-and with numbers of `DIGITS` digits. A table is a CSV file, whose changes git shows; a large table
-is compressed (``.csv.xz``) to save space.
+Git stores the expected tables in ``results/reference``, without columns that are never compared and
+with numbers of `DIGITS` digits. They are CSV files, so that git shows their changes; large tables
+are compressed (``.csv.xz``) to save space.
 """
 
 import lzma
@@ -36,12 +36,12 @@ WRONG_ERROR, WRONG_TOLERANCE = 0.1, 0.3
 SELECTION_TOLERANCE = 0.25
 # Relative tolerance of numbers in unstable cells: a factor of 5.
 UNSTABLE_TOLERANCE = 1 - 1 / 5
-# Part of its tolerance by which a cell may differ without being shifted.
+# A stable cell counts as shifted if it differs by more than this part of its tolerance.
 SHIFT = 0.1
 # Share (rounded up) and number of cells that may change: shifted stable cells, unstable cells, and
-# words; the latter have their share from the column, which declares it as its tolerance.
+# words. The share of changed words is the tolerance that their column declares.
 SHIFTED_CELLS, UNSTABLE_CELLS, UNSTABLE_WORDS = (0.5, 2), (0.25, 1), 3
-# Cells are counted in a whole column, and in rows that are equal in these columns.
+# Changed cells are counted in a whole column, and in its rows with equal values in these columns.
 COUNTED_BY = ["scene", "method", "motion", "split", "noisy_axes"]
 # Amplification of rounding errors above which a cell is unstable: values, results of runs.
 UNSTABLE_VALUE, UNSTABLE_RUN = 1e5, 1e2
@@ -51,11 +51,11 @@ UNSTABLE_TABLES = ("hard_cases", "noise")
 RUNS, SAMPLING = "reduced_reruns", ["scene", "group", "method", "r"]
 REDUCED_RUN = [*SAMPLING, "position_basis", "k"]
 CELLS_IN_MESSAGE = 6
-Difference = tuple[float, str]  # (difference over tolerance, inf if not a number; message)
+Difference = tuple[float, str]  # (difference divided by tolerance, or inf if undefined; message)
 
 
 def kept(table: Table) -> list[Column]:
-    """Columns of ``table`` that are compared, and stored in its expected version."""
+    """Return the columns of ``table`` that are stored in its expected version and compared."""
     return [column for column in table.columns if column.quantity in TOLERANCES]
 
 
@@ -65,24 +65,24 @@ def identifies(column: Column) -> bool:
 
 
 def identities(rows: pd.DataFrame, columns: list[str]) -> list[tuple[str, ...]]:
-    """Return for each row its cells in ``columns`` as texts; ``nan`` if it has no such column."""
+    """Return for each row its cells in ``columns`` as texts; ``nan`` if a column is missing."""
     cells = rows.reindex(columns=columns).itertuples(index=False, name=None)
     return [tuple("nan" if pd.isna(cell) else str(cell) for cell in row) for row in cells]
 
 
 def selected_by_fit(rows: pd.DataFrame) -> np.ndarray:
-    """Boolean array: rows of ECSW, or all rows if a table without methods has its tolerance."""
+    """Return a boolean array: rows of ECSW, or all rows if there is a column tau but no method."""
     method = rows.get("method", pd.Series("ecsw" if "tau" in rows else "", rows.index))
     return method.astype(str).str.contains("ecsw").to_numpy(dtype=bool)
 
 
 class Context:
-    """Facts on all tables that the expected ``tables`` and the ``found`` table of runs show.
+    """Properties of scenes and runs, from the expected ``tables`` and the ``found`` table of runs.
 
-    chaotic : scenes with frames beyond the horizon of predictability
-    modes : cells in the columns `EXPERIMENT` -> number of modes above round-off
-    gains : cells in the columns `SAMPLING` -> factor by which sampling amplifies errors
-    diverged : cells in the columns `REDUCED_RUN` of runs without an error: expected ones, found
+    chaotic : scenes with frames after the predictability horizon
+    modes : cells in the columns `EXPERIMENT` -> number of modes above rounding errors
+    gains : cells in the columns `SAMPLING` -> DEIM constant, by which sampling amplifies errors
+    diverged : cells in the columns `REDUCED_RUN` of diverged runs: expected ones, found ones
     """
 
     def __init__(
@@ -101,10 +101,10 @@ class Context:
         self.diverged = [{*identities(each[each[ERROR].isna()], REDUCED_RUN)} for each in both]
 
     def amplification(self, table: Table, rows: pd.DataFrame) -> np.ndarray:
-        """Array with the factor by which rounding errors grow in each of the ``rows``.
+        """Return the factor by which rounding errors grow in each of the ``rows``.
 
-        It is the largest gain in a row and of its sampling, and infinite in unstable tables,
-        chaotic scenes, and bases of all modes above round-off, or of all but one.
+        It is the largest DEIM constant in the row and of its sampling. It is infinite in unstable
+        tables, chaotic scenes, and for bases of all modes above rounding errors, or all but one.
         """
         gains = rows.filter(regex="^gain").select_dtypes(float).fillna(0.0)
         gains["known"] = [self.gains.get(key, 0.0) for key in identities(rows, SAMPLING)]
@@ -116,10 +116,10 @@ class Context:
 
 
 class Comparison:
-    """Comparison of an ``expected`` table with the ``found`` one, cell by cell.
+    """Comparison of an ``expected`` table with the ``found`` table, cell by cell.
 
-    pairs : positions ``row_x`` (expected) and ``row_y`` (found) of rows with equal identities; of
-        several, the k-th expected row has the k-th found one
+    pairs : positions ``row_x`` (expected) and ``row_y`` (found) of rows with equal identities; if
+        an identity is repeated, its k-th rows form a pair
     e, f : these rows of the expected table (e) and of the found table (f), in equal order
     parts : name of a part of these rows, see `COUNTED_BY` -> their positions
     timed : for each of these rows, the columns whose cell depends on a measured time
@@ -132,7 +132,7 @@ class Comparison:
         keys = []
         for frame in self.frames:
             key = frame[[c.name for c in table.columns if identifies(c)]].map(_text).astype(str)
-            if "r" in frame:  # it identifies a row, too, unless a fit has selected it
+            if "r" in frame:  # r also identifies a row, unless a fit has selected r elements
                 key["r"] = frame.r.map(_text).astype(str).mask(selected_by_fit(frame), "")
             key["occurrence"] = key.groupby(list(key)).cumcount()
             keys.append(key.assign(row=range(len(key))))
@@ -154,14 +154,14 @@ class Comparison:
         return [message for _, message in found]
 
     def unstable(self, column: Column) -> np.ndarray:
-        """Boolean array: rows in which rounding errors decide the cell of ``column``."""
+        """Return a boolean array: rows in which rounding errors decide the cell of ``column``."""
         if column.kind in WORDS and column.tolerance:
             return np.full(len(self.e), True)
         limits = {"exact": np.inf, "value": UNSTABLE_VALUE}
         return self.amplification > limits.get(column.quantity, UNSTABLE_RUN)
 
     def tolerances(self, column: Column) -> np.ndarray:
-        """Array (rows) with the largest difference of each cell of ``column`` that is no change."""
+        """Return for each row the largest difference that is allowed in the cell of ``column``."""
         tolerance = np.full(len(self.e), 0.0 if column.kind in WORDS else column.within)
         if column.quantity == "value" and column.kind == "integer":
             tolerance[selected_by_fit(self.e)] = SELECTION_TOLERANCE
@@ -175,10 +175,10 @@ class Comparison:
         return tolerance
 
     def distance(self, column: Column) -> np.ndarray:
-        """Array (rows) with the difference of the expected and the found cell of ``column``.
+        """Return for each row the difference of the expected and the found cell of ``column``.
 
-        It is absolute for shares, and otherwise divided by the larger number. It is 0 for equal
-        cells, inf for unequal texts or if one of the cells is empty.
+        The difference is absolute for shares, and otherwise divided by the larger number. It is 0
+        for equal cells, inf for unequal texts or if one of the cells is empty.
         """
         name = column.name
         if column.kind in WORDS:
@@ -205,10 +205,10 @@ class Comparison:
             off = f" (off by {distance[row]:.2g}, allowed {tolerances[row]:.2g})"
             place = f"{_place(self.table, self.e, int(row))}, {column.name}"
             yield size, f"{place}: expected {e}, found {f}" + off * bool(np.isfinite(distance[row]))
-        if not (stable & far).any() and column.within <= WRONG_TOLERANCE:  # no coarse estimate
+        if not (stable & far).any() and column.within <= WRONG_TOLERANCE:  # not a coarse estimate
             cells = self.e[column.name]
             stable &= (cells.notna() & cells.ne(0)).to_numpy(dtype=bool)
-            name = f"{column.name} differs by a tenth of its tolerance"
+            name = f"{column.name} differs by over 10 % of its tolerance"
             yield from self._counted(name, stable, distance > SHIFT * tolerances, *SHIFTED_CELLS)
         share = column.tolerance if column.kind in WORDS else None
         limit = (share, UNSTABLE_WORDS) if share else UNSTABLE_CELLS
@@ -222,7 +222,7 @@ class Comparison:
         for place, part in self.parts.items() if changed.any() else ():
             total, count = int(cells[part].sum()), int(changed[part].sum())
             if count > (allowed := max(number, math.ceil(share * total))):
-                text = f"expected at most {allowed} of {total} changed, found {count}"
+                text = f"at most {allowed} of {total} cells may change, {count} have changed"
                 yield np.inf, f"{name}{place}: {text}"
 
     def unmatched(self) -> Iterator[Difference]:
@@ -244,21 +244,21 @@ class Comparison:
 
 
 def _text(cell: object) -> str:
-    """Text of a cell, with fewer digits than stored; empty if the cell is missing."""
+    """Return the text of a cell, with fewer digits than stored; "" if the cell is empty."""
     if pd.isna(cell):
         return ""
     return f"{cell:.6g}" if isinstance(cell, float) else " ".join(str(cell).split())[:60]
 
 
 def _place(table: Table, rows: pd.DataFrame, row: int) -> str:
-    """Number of a ``row``, and the first names, parameters and values in it, for a message."""
+    """Return the number of a ``row`` and its first names, parameters and values, as text."""
     names = [c.name for c in table.columns if identifies(c) or c.quantity == "value"]
     cells = [(name, _text(rows[name].iloc[row])) for name in names]
     words = [f"{name} {cell}" for name, cell in cells if cell][:CELLS_IN_MESSAGE]
     return f"row {rows.index[row] + 1} ({', '.join(words)})"
 
 
-# Stored digits of numbers; the error of rounding is at most a hundredth of any tolerance.
+# Stored digits of numbers; the error of rounding is at most 1 % of any tolerance.
 DIGITS = 9
 SUFFIXES, PACKED_BYTES = (".csv", ".csv.xz"), 50_000  # larger files (in bytes) are compressed
 LOG = "changes.md"
@@ -277,7 +277,7 @@ class Reference(NamedTuple):
 
 
 def folder_of(results: str) -> Path:
-    """Folder of the expected tables with which those in the folder ``results`` are compared."""
+    """Return the folder of the expected tables for the results in the folder ``results``."""
     root = Path(RESULTS)
     return root / "reference" / Path(results).relative_to(root) / "tables"
 
@@ -295,7 +295,7 @@ def write_reference(table: Table, frame: pd.DataFrame, folder: Path) -> None:
 
 
 def read_references(folder: Path) -> dict[str, Reference]:
-    """Return name -> expected table in ``folder``; StorageError if one cannot be read."""
+    """Map names to the expected tables in ``folder``; StorageError if one cannot be read."""
     found = {}
     for name, table in declared().items():
         for path in (p for suffix in SUFFIXES if (p := folder / f"{name}{suffix}").is_file()):

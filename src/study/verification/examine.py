@@ -1,4 +1,4 @@
-"""Comparison of the claims, figures and tables of a results folder with the expected ones."""
+"""Compare the claims, figures and tables of a results folder with the expected ones."""
 
 from collections.abc import Iterable, Mapping
 from enum import StrEnum
@@ -21,7 +21,7 @@ from study.verification.compare import Reference, folder_of, read_references
 from study.verification.subject import Subject, differing, is_derived
 
 # Columns of the table claims with verdicts, and their names in messages.
-VERDICTS = {"verdict": "as published", "verdict_beyond": "beyond"}
+VERDICTS = {"verdict": "as published", "verdict_beyond": "improved methods"}
 
 
 class Outcome(StrEnum):
@@ -37,7 +37,7 @@ class Outcome(StrEnum):
 class Line(NamedTuple):
     """Outcome of comparing one claim, figure or table with the expected one.
 
-    kind : claim, figure, table, or file: a result that does not fit the plan
+    kind : claim, figure or table; file if the line is about a result that does not fit the plan
     text : largest difference with its row and column, or the reason for the outcome
     details : all differences as text, largest first
     """
@@ -61,18 +61,18 @@ class Examination:
     def __init__(self, subject: Subject) -> None:
         self.subject = subject
 
-    @cache  # noqa: B019 : as many paths as the study has files
+    @cache  # noqa: B019 : the number of files limits the size of the cache
     def intact(self, path: str) -> bool:
-        """Return whether the file at ``path`` is there and agrees with its checksum."""
+        """Return whether the file ``path`` exists and agrees with its checksum."""
         return Path(path).is_file() and check_file(path) is Condition.INTACT
 
     def lines(self) -> list[Line]:
-        """Outcomes of claims, figures, tables, and of files that do not fit the study."""
+        """Return the outcomes of claims, figures, tables, and files that do not fit the study."""
         tables = {name: self.table(name) for name in declared()}
         figures = [self._figure(job, tables) for job in self.subject.plan.fixed["figures"]]
         there = sorted(Path(TABLE.at(self.subject.results, name="any")).parent.glob("[!.]*.csv"))
         foreign = [
-            Line("table", path.stem, Outcome.DIFFERS, f"{path} is no table of the study")
+            Line("table", path.stem, Outcome.DIFFERS, f"the study has no table {path}")
             for path in there
             if path.stem not in declared()
         ]
@@ -83,7 +83,7 @@ class Examination:
         ]
         return [*self.claims(tables["claims"]), *figures, *tables.values(), *foreign, *unfit]
 
-    @cache  # noqa: B019 : one of each table
+    @cache  # noqa: B019 : the number of tables limits the size of the cache
     def found(self, name: str) -> pd.DataFrame:
         """Return table ``name`` of the results folder with all declared columns.
 
@@ -99,12 +99,12 @@ class Examination:
 
     @cached_property
     def expected(self) -> dict[str, Reference]:
-        """Name of a table -> expected table, for each table that has one."""
+        """Name of a table -> its expected version, if one exists."""
         return read_references(folder_of(self.subject.results))
 
     @cached_property
     def context(self) -> compare.Context:
-        """Properties of scenes and runs: they show which table rows are unstable."""
+        """Properties of scenes and runs from which the unstable table rows follow."""
         tables = {name: reference.frame for name, reference in self.expected.items()}
         try:
             return compare.Context(tables, self.found(compare.RUNS))
@@ -112,7 +112,7 @@ class Examination:
             return compare.Context(tables)
 
     def outdated(self, name: str) -> bool:
-        """Return whether table ``name`` is made from tables alone, which give another table."""
+        """Return whether table ``name`` reads only tables and differs when it is made again."""
         job = self.subject.plan.job(declared()[name])
         tables = [path for path in job.files if path.startswith("results/")]
         return is_derived(name) and all(map(self.intact, tables)) and bool(differing(job))
@@ -126,9 +126,9 @@ class Examination:
             there = self.intact(TABLE.at(self.subject.results, name=name))
             return line(Outcome.DIFFERS if there else Outcome.MISSING, str(error))
         if name not in self.expected:
-            return line(Outcome.NO_REFERENCE, "run verify --update")
+            return line(Outcome.NO_REFERENCE, "to accept it, run verify --update")
         if self.outdated(name):
-            return line(Outcome.DIFFERS, "it is not what the tables at hand give")
+            return line(Outcome.DIFFERS, "the tables that it reads give another result")
         reference, columns = self.expected[name], compare.kept(table)
         known = frame.assign(**dict.fromkeys(set(frame) - set(reference.columns)))
         found = compare.Comparison(table, reference.frame, table.checked(known), self.context)
@@ -136,14 +136,14 @@ class Examination:
             more = f" and {len(differences) - 1} more" if differences[1:] else ""
             return line(Outcome.DIFFERS, differences[0] + more, tuple(differences))
         if new := [column.name for column in columns if column.name not in reference.columns]:
-            return line(Outcome.NO_REFERENCE, f"column(s) {', '.join(new)}: run verify --update")
+            return line(Outcome.NO_REFERENCE, f"new column(s) {', '.join(new)}: verify --update")
         if all(map(compare.identifies, columns)):
-            text = "its numbers are times or round-off; names and sizes agree"
+            text = "its numbers are times or rounding errors; names and sizes agree"
             return line(Outcome.NOT_COMPARABLE, text)
         return line(Outcome.REPRODUCED, f"{len(frame)} rows")
 
     def claims(self, table: Line) -> list[Line]:
-        """Outcome of each claim; that of ``table``, the table of claims, if this is unusable."""
+        """Return the outcome of each claim, or of their ``table`` if this cannot be used."""
         unusable = table.outcome is not Outcome.REPRODUCED and not table.details
         found = None if unusable else self.found("claims").set_index("claim")
         if found is None or not found.index.is_unique:
@@ -155,7 +155,7 @@ class Examination:
     def _missing(self, name: str, paths: Iterable[str]) -> str:
         lost = next((path for path in paths if not self.intact(path)), None)
         how = self.subject.command(name)
-        return f"{lost} is not there or damaged; make it by {how}" if lost else ""
+        return f"{lost} is missing or damaged; run {how}" if lost else ""
 
     def _figure(self, figure: Job, tables: Mapping[str, Line]) -> Line:
         line = partial(Line, "figure", figure.artifact.name)
@@ -166,22 +166,22 @@ class Examination:
             return line(Outcome.MISSING, missing)
         names = ", ".join(table.name for table in read)
         if bad := [table for table in read if table.outcome not in GOOD]:
-            return line(bad[0].outcome, f"reads the table(s) {', '.join(b.name for b in bad)}")
+            return line(bad[0].outcome, f"it shows the table(s) {', '.join(b.name for b in bad)}")
         timed = read and all(table.outcome is Outcome.NOT_COMPARABLE for table in read)
         outcome = Outcome.NOT_COMPARABLE if timed else Outcome.REPRODUCED
-        return line(outcome, f"by the table(s) {names}" if read else "its files are intact")
+        return line(outcome, f"it shows the table(s) {names}" if read else "its files are intact")
 
 
 def _claim(name: str, expected: pd.DataFrame, found: pd.DataFrame) -> Line:
     if name not in expected.index or name not in found.index:
-        text = "the claim is new" if name in found.index else "the claim is gone"
+        text = "the claim is new" if name in found.index else "the claim is missing"
         return Line("claim", name, Outcome.DIFFERS, text)
     rule = load_claims(Path(RULES)).get(name)
     timed = timed_columns(rule) if rule else set()
     texts, outcomes = [], []
     for column, words in VERDICTS.items():
         a, b = str(expected.loc[name, column]), str(found.loc[name, column])
-        changed = f"expected '{a}', found '{b}'" + ", which rests on times" * (column in timed)
+        changed = f"expected '{a}', found '{b}'" + ", which depends on times" * (column in timed)
         texts.append(f"{words}: {b if a == b else changed}")
         bad = Outcome.NOT_COMPARABLE if column in timed else Outcome.DIFFERS
         outcomes.append(Outcome.REPRODUCED if a == b else bad)

@@ -1,4 +1,4 @@
-"""Command ``./reproduce number NAME`` shows from which cells a number of the manuscript comes."""
+"""Show the table cells behind a number of the manuscript (``./reproduce number NAME``)."""
 
 import json
 import sys
@@ -16,9 +16,9 @@ from study.verification.subject import Subject, options_parser, say
 
 
 def number(arguments: Sequence[str]) -> None:
-    """Print value, table, column and rows of the number of the last run that is named."""
-    parser = options_parser("number", "Show the cells behind a number of the manuscript.")
-    parser.add_argument("name", help="a name in paper/numbers.yaml, as in the text's \\n{NAME}")
+    """Print value, table, column and rows of a number of the manuscript, from the last run."""
+    parser = options_parser("number", "Show the table cells behind a number of the manuscript.")
+    parser.add_argument("name", help="name of the number in paper/numbers.yaml")
     chosen = parser.parse_args(arguments)
     subject = Subject.of(chosen.configfile, chosen.config)
     found = json.loads(read_text(Path(PAPER_INPUT.at(subject.results, name=NUMBERS))))["numbers"]
@@ -31,7 +31,7 @@ def number(arguments: Sequence[str]) -> None:
     taken = f", {made['take']} of {len(made['rows'])} rows" if made["take"] else ""
     say(f"table {made['table']}, column {made['column']}{taken}")
     path = Path(TABLE.at(subject.results, name=made["table"]))
-    if path.is_file():  # tables about the configuration and the machine are no files
+    if path.is_file():  # tables about the configuration and the machine have no file
         columns = list(dict.fromkeys([*entry.rows, made["column"]]))
         rows = read_table(path).iloc[made["rows"]][columns]
         say(rows.rename(index=lambda row: row + 1).to_string())

@@ -1,11 +1,11 @@
-"""Results that ``verify`` and ``bundle`` read, and the exit codes and output of both commands.
+"""Find the results that ``verify`` and ``bundle`` read; define their exit codes and output.
 
 The results belong to one configuration, by default that of the last run.
 
 ``./reproduce verify --files`` checks that every file is unchanged since the last run. The plan of
 the study lists the files that must exist, the manifest has their checksums. Tables, figures and the
-manuscript, unlike experiments, are also made again and compared, which reveals a file that was
-replaced together with its checksum and its manifest entry.
+manuscript, but not experiments, are also made again and compared. This finds files that were
+replaced together with their checksums and manifest entries.
 """
 
 import argparse
@@ -37,7 +37,7 @@ from study.tables import declared
 class Subject:
     """Results folder of one configuration, and the command that makes the results.
 
-    options : command-line options that name the configuration
+    options : command-line options that select the configuration
     """
 
     options: tuple[str, ...]
@@ -47,7 +47,7 @@ class Subject:
     def of(cls, configfiles: Sequence[str], settings: Sequence[str]) -> "Subject":
         """Return the results of the configuration that files and ``settings`` (KEY=VALUE) define.
 
-        If both are empty, it is the configuration of the last run.
+        If both are empty, use the configuration of the last run.
         """
         files = ["--configfile", *configfiles] if configfiles else []
         command = CommandLine([*files, *(["--config", *settings] if settings else [])] or recall())
@@ -60,14 +60,14 @@ class Subject:
         return self.folders.results
 
     def command(self, *targets: str) -> str:
-        """Shell command that makes the files ``targets``, or without targets the whole study."""
+        """Return the shell command that makes ``targets``; without targets, the whole study."""
         ends = ["--", *targets] if targets and self.options else targets
         return shlex.join(["./reproduce", *self.options, *ends])
 
     @cached_property
     def plan(self) -> Plan:
         """Plan of the study; configuration files and settings are merged as in Snakemake."""
-        # Snakemake is imported only here, so that ``--help`` and argument errors come at once.
+        # Snakemake is imported only here, so that ``--help`` and argument errors appear at once.
         from snakemake.cli import parse_config
         from snakemake.settings.types import ConfigSettings
         from snakemake.utils import update_config
@@ -81,15 +81,16 @@ class Subject:
 
 
 def options_parser(command: str, about: str, epilog: str | None = None) -> argparse.ArgumentParser:
-    """Return a parser of --configfile and --config, options of ``./reproduce`` with ``command``."""
+    """Return a parser for ``./reproduce command`` with the options --configfile and --config."""
+    last = "configuration of the results; default: that of the last run"
     made = argparse.ArgumentParser(prog=f"./reproduce {command}", description=about, epilog=epilog)
-    made.add_argument("--configfile", nargs="+", default=[], metavar="FILE")
-    made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE")
+    made.add_argument("--configfile", nargs="+", default=[], metavar="FILE", help=last)
+    made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="its settings")
     return made
 
 
 class Status(IntEnum):
-    """Exit code of ``verify`` and ``bundle``; 1 is that of an error, 2 of an unknown option."""
+    """Exit code of ``verify`` and ``bundle``; an error gives 1, an unknown option 2."""
 
     HOLDS = 0
     DIFFERS = 3
@@ -103,8 +104,8 @@ def say(line: str) -> None:
 
 DAMAGED = "damaged (its checksum differs)"
 NOT_THERE = "not there"
-REPLACED = "not what its inputs give"
-NOT_OURS = "no file of this study"
+REPLACED = "not made from its inputs"
+NOT_OURS = "not a file of this study"
 NOT_LISTED = "not in the manifest"
 # Largest number of faults that are printed one by one.
 FAULTS_SHOWN = 20
@@ -115,12 +116,12 @@ JOB_ERRORS = (PdromError, ArithmeticError, AttributeError, LookupError, TypeErro
 def verify_files(subject: Subject) -> Status:
     """Compare a study's files with its manifest; print faults, and commands to make files again.
 
-    The next run makes a file again that differs, also if size and dates are those of the last run.
+    The next run makes different files again, even if their size and dates are unchanged.
     """
     try:
         listed = read_manifest(subject.results).files
     except StorageError as error:
-        say(f"{error}; a run that succeeds writes it: {subject.command()}")
+        say(f"{error}; every successful run writes it, run {subject.command()}")
         there = Path(MANIFEST.at(subject.results)).exists()
         return Status.DIFFERS if there else Status.MISSING
     entries = {os.path.normpath(Path(subject.results, name)): e for name, e in listed.items()}
@@ -139,9 +140,9 @@ def verify_files(subject: Subject) -> Status:
     for path, fault in list(faults.items())[:FAULTS_SHOWN]:
         say(f"{path}: {fault}" + ("" if fault == NOT_OURS else f"; run {subject.command()}"))
     if len(faults) > FAULTS_SHOWN:
-        say(f"and {len(faults) - FAULTS_SHOWN} more; finish the study by {subject.command()}")
+        say(f"and {len(faults) - FAULTS_SHOWN} more; run {subject.command()}")
     count = len({*paths, *faults})
-    say(f"{count - len(faults)} of {count} files are as the last run left them")
+    say(f"{count - len(faults)} of {count} files are unchanged since the last run")
     if NOT_THERE in faults.values():
         return Status.MISSING
     return Status.DIFFERS if faults else Status.HOLDS
@@ -158,9 +159,9 @@ def _fault(path: str, entry: Entry | None, ours: bool) -> str:
 
 
 def differing(job: Job) -> list[str]:
-    """Repeat a job elsewhere; return the paths of outputs that change, or all if it fails."""
+    """Repeat a job in another folder; return the outputs that differ, or all if the job fails."""
     old = list(job.outputs.values())
-    # subfolders are kept: two outputs may have equal file names
+    # keep subfolders, because two outputs may have equal file names
     root = os.path.commonpath([os.path.dirname(path) or os.curdir for path in old])
     with TemporaryDirectory(prefix="pdrom-again-") as folder:
         new = [os.path.join(folder, os.path.relpath(path, root)) for path in old]
@@ -172,6 +173,6 @@ def differing(job: Job) -> list[str]:
 
 
 def is_derived(name: str) -> bool:
-    """Return whether the table ``name`` reads only other tables, no results of experiments."""
+    """Return whether the table ``name`` reads only other tables and no results of experiments."""
     reads = declared()[name].reads.values()
     return not any(isinstance(read, Every) for read in reads)

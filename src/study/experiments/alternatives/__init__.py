@@ -1,1 +1,1 @@
-"""Comparison of methods that solve the same scenes: error against time per frame."""
+"""Compare methods that solve the same scenes by their error and their time per frame."""

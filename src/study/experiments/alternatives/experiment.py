@@ -1,8 +1,8 @@
-"""Error and time of every setting that simulates a scene, on its own mesh and on coarser ones.
+"""Measure error and time of every setting that simulates a scene, on its mesh and coarser meshes.
 
-The reference is the scene's implicit time step, solved to convergence, which methods approach with
-more iterations. All settings run the held-out motions; only subspaces are trained.
-Where reduced models are chosen, they and all others run validation motions, too.
+The reference is the converged step of the scene, which methods approach with more iterations. All
+settings run the test trajectories; only subspaces are trained. If a reduced model is to be chosen
+for a scene, all settings also run validation trajectories.
 """
 
 import logging
@@ -51,13 +51,13 @@ from study.experiments.kit.measurement import Processes, in_processes
 from study.experiments.kit.runs import Row
 
 SAMPLED, NEWTON = REDUCTIONS = "ecsw", "ecsw-newton"  # names of the reduced methods
-TWO_LEVEL: Final = "two-level"  # full-order method whose coarse level is a trained subspace
-CONVERGED: Final = "converged"  # name of the reference: the implicit step solved to convergence
+TWO_LEVEL: Final = "two-level"  # full-order method with a trained subspace as coarse level
+CONVERGED: Final = "converged"  # name of the reference: the converged step
 COARSE: Final = (COARSER, COARSER_ANDERSON)
-TRAINING: Final = "training"  # key in `Comparison.work` for runs on which reductions are trained
+TRAINING: Final = "training"  # key in `Comparison.work` for training runs
 ACCELERATED: Final = {PLAIN: 0, COARSER: 0, ANDERSON: WINDOW, COARSER_ANDERSON: WINDOW}
 
-# Columns of tables that together identify a candidate (a method with its settings) in a scene.
+# Columns of tables that together identify a method with its settings in a scene.
 SETTING: Final = [
     "method", "vertices", "substeps", "iterations", "training_motions", "k", "skinning",
     "tolerance",
@@ -73,17 +73,17 @@ Method = Literal[
 ]  # fmt: skip
 
 
-# Frames of training runs converge to this part of the mesh; projections are evaluated up to `MOST`
-# times in a frame, also of the implicit reference.
+# Tolerance of converged training runs relative to the longest side of the mesh; largest number of
+# evaluations of the projections in a frame of training runs and of converged runs.
 TRAINING_TOLERANCE, MOST = 1e-5, 4000
 COARSE_TAU = 5e-3  # sampling tolerance of the coarse level of the two-level method
-VALIDATION = 1_000_000  # first seed of validation motions, far from those of training motions
+VALIDATION = 1_000_000  # first seed of validation trajectories; no training trajectory has it
 
 
 class ImplicitReference(ConfigModel):
-    """Tolerance of the converged implicit step, over the longest side of the mesh.
+    """Tolerance of the converged step, relative to the longest side of the mesh.
 
-    Its error is told by a solve that is ``finer`` by this factor.
+    A run whose tolerance is smaller by the factor ``finer`` estimates the step's error.
     """
 
     tolerance: kit.Tolerance = 1e-7
@@ -91,9 +91,9 @@ class ImplicitReference(ConfigModel):
 
 
 class ReducedModel(ConfigModel):
-    """A reduced model with sampled elements, trained on each number of motions, and how it runs.
+    """A reduced model with sampled elements, numbers of training trajectories and of iterations.
 
-    iterations, newton : numbers of iterations of a frame, local/global or of Newton's method
+    iterations, newton : numbers of local/global iterations and of Newton iterations of a frame
     """
 
     modes: kit.Modes = 40
@@ -105,7 +105,7 @@ class ReducedModel(ConfigModel):
 
     @property
     def runs(self) -> Mapping[str, Sequence[int | None]]:
-        """Method -> numbers of iterations; None: converged."""
+        """Method -> numbers of iterations; None: until convergence."""
         steps = [None if isinstance(count, str) else count for count in self.newton]
         return {SAMPLED: [*self.iterations], NEWTON: steps}
 
@@ -118,17 +118,17 @@ class ReducedModel(ConfigModel):
 class Comparison(Processes):
     """Settings of the comparison of methods on one scene and one mesh.
 
-    Each of ``processes`` new processes times ``frames`` frames spread over each held-out motion.
+    Each of ``processes`` new processes times ``frames`` frames spread over each test trajectory.
 
-    steps : method -> pairs (substeps of a frame, iterations of each substep); only those of plain
-        and accelerated iterations on the own mesh may have several substeps
-    coarser : parts of the cells along a side that coarser meshes have
+    steps : method -> pairs (substeps of a frame, iterations of each substep); several substeps are
+        allowed only for plain and accelerated iterations on the scene's mesh
+    coarser : numbers of cells along a side of coarser meshes, relative to the scene's mesh
     work : method -> largest product vertices x substeps x iterations (for ``training``: vertices x
-        motions); runs with more work are left out
-    models : reduced models, whose training motions begin with the scene's motion
+        trajectories); runs with more work are left out
+    models : reduced models, whose first training trajectory is that of the scene
     choice : "scene/factor" -> models from which one is chosen, in place of ``models``
-    seconds : length of all runs, s
-    validation : number of motions on which models are chosen
+    seconds : simulated time of each run, s
+    validation : number of validation trajectories, by which a model is chosen
     """
 
     steps: dict[Method, tuple[Steps, ...]] = Field(default_factory=dict)
@@ -148,14 +148,14 @@ class Comparison(Processes):
         return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
 
     def affords(self, method: Any, work: int) -> bool:
-        """Whether ``work`` (vertices x substeps x iterations) is within the limit of ``method``."""
+        """Return whether ``work`` (vertices x substeps x iterations) is allowed for ``method``."""
         return work <= self.work.get(method, work)
 
 
 class Alternatives(Comparison):
     """Section ``alternatives``.
 
-    scenes : scene -> factors by which its mesh gets more vertices along a side, with equal mass
+    scenes : scene -> factors of the number of vertices along a side; the total mass stays equal
     """
 
     scenes: kit.Sizes = Field(default_factory=dict)
@@ -172,10 +172,10 @@ COLUMNS = [
 
 
 class Trained(NamedTuple):
-    """A reduced model, trained on a number of motions, and how it runs.
+    """A reduced model, trained on a number of trajectories, and its numbers of iterations.
 
-    labels : columns of tables that describe it
-    iterations : method -> numbers of iterations; None: converged
+    labels : columns of tables that describe the model
+    iterations : method -> numbers of iterations; None: until convergence
     """
 
     labels: Row
@@ -185,7 +185,7 @@ class Trained(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """A scene with one motion, its coarser meshes, its models, and the settings to compare."""
+    """A scene with one trajectory, its coarser meshes, its models, and the settings to compare."""
 
     labels: Row
     scene: Scene
@@ -194,7 +194,7 @@ class Case:
     section: Comparison
 
     def settings(self) -> Iterator[Setting]:
-        """Yield every setting, ready to run; models were trained on other motions."""
+        """Yield every setting, ready to run; models were trained on other trajectories."""
         yield from self._full_order()
         for known, model, runs in self.models:
             for method, asked in ((m, count) for m, counts in runs.items() for count in counts):
@@ -236,10 +236,10 @@ class Case:
         return {**labels, "iterations": iterations}
 
     def starts(self) -> tuple[Starts, int]:
-        """States from which single frames are timed, and how many of them come first to warm up.
+        """Return states from which single frames are timed, and the number of frames to warm up.
 
-        One frame for each set of active boundary conditions comes first: an unmeasured run of these
-        factorises all matrices, so that no measured frame has to.
+        One frame for each set of active boundary conditions comes first. They are run without being
+        timed and factorise all matrices, so that no timed frame has to.
         """
         scene, wanted = self.scene, min(self.section.frames, self.scene.config.frames)
         places = np.linspace(0, scene.config.frames - 1, wanted).round().astype(int)
@@ -251,17 +251,17 @@ class Case:
         return tuple((states[frame], int(frame)) for frame in places), len(first)
 
     def variants(self, starts: Starts, warm: int) -> Iterator[Variant]:
-        """Yield the step loops of all settings, to be timed in a frame from each of ``starts``."""
+        """Yield the step loops of all settings, to time a frame from each of ``starts``."""
         for each in self.settings():
             yield each.variant(self.labels, len(starts), starts, warm)
 
 
 def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
-    """Yield models in position subspaces with sampled elements, trained on one or more motions.
+    """Yield models with sampled elements in position subspaces, trained on several trajectories.
 
-    The first motion is that of ``training``, others are random variants of it. POD modes of every
-    n-th converged frame of n motions span a subspace, in which its elements are sampled. The coarse
-    level of the two-level method is trained on the first motion.
+    The first trajectory is that of ``training``, others are random variants of it. POD modes of
+    every n-th converged frame of n trajectories span a subspace, for which elements are sampled.
+    The coarse level of the two-level method is trained on the first trajectory.
     """
     vertices = training.mesh.vertices
     scenes, runs, spent = [training], list[np.ndarray](), 0.0
@@ -275,7 +275,7 @@ def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
         for scene in scenes[len(runs) :]:
             run = converged_run(scene, TRAINING_TOLERANCE, MOST)
             if run is None:
-                log.warning("%s: a training motion does not converge", training.config.name)
+                log.warning("%s: a training trajectory does not converge", training.config.name)
                 return
             runs.append(run[1:])
         spent += process_time() - started
@@ -292,7 +292,7 @@ def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
             tolerances = [tolerance for tolerance, _ in trials]
             made = sampled_models(scenes, columns, np.arange(len(runs[0])), tolerances)
             seconds = spent + process_time() - started
-            log.info("%d motions, %d + %d columns: %.0f s", count, modes, skinning, seconds)
+            log.info("%d trajectories, %d + %d columns: %.0f s", count, modes, skinning, seconds)
             for (tolerance, iterations), model in zip(trials, made, strict=True):
                 labels: Row = {
                     "vertices": vertices, "training_motions": count, "k": columns.modes,
@@ -304,7 +304,7 @@ def trained(training: Scene, section: Comparison) -> Iterator[Trained]:
 
 
 def substepped(scene: Scene, substeps: int) -> Scene:
-    """Return the scene with each frame split into ``substeps``; effects keep their seconds."""
+    """Split each frame of ``scene`` into ``substeps``; effects begin and end at the same times."""
     config = scene.config
     return scene.changed(
         time_step=config.time_step / substeps,
@@ -359,12 +359,12 @@ def sized(config: SceneConfig, factor: float) -> SceneConfig:
 
 
 def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[Row]:
-    """Yield rows with errors of runs in the motion of ``case``, one row for each run.
+    """Yield a row with errors for each run of the trajectory of ``case``.
 
-    The first are the converged implicit step on all meshes and the ``recorded`` training motion,
-    shown instead. Errors are None if a frame of the converged step did not converge or its work
-    exceeds the limit in the section, and of runs that blew up. Only a ``test`` motion is compared
-    with a finer solve.
+    The first rows are those of the converged step on all meshes, and of replaying the ``recorded``
+    training trajectory. Errors are None for runs that blew up, and for all runs if the converged
+    step did not converge or exceeds the limit of work. Only for a ``test`` trajectory, the error of
+    the converged step is estimated.
     """
     scene, section = case.scene, case.section
     frames, implicit = scene.config.frames, None
@@ -395,7 +395,7 @@ def _rows(case: Case, recorded: np.ndarray, test: bool) -> Iterator[Row]:
 
 
 def _own_errors(truth: Yardstick, tolerance: float) -> Row:
-    """Errors of the converged run against a finer one, on sheets from other starting points."""
+    """Return errors of the converged run against a finer run, which starts otherwise on sheets."""
     scene, frames = truth.scene, truth.scene.config.frames
     finer = converged_run(scene, tolerance, MOST, from_last=not len(scene.mesh.tetrahedra))
     if finer is None:

@@ -1,8 +1,8 @@
-"""Methods that solve the same scenes, with the same energies, as projective dynamics.
+"""Solve scenes by alternatives to projective dynamics that minimise the same energies.
 
 They are Chebyshev's semi-iteration (Wang 2015, alg. 1) and Anderson acceleration with a coarse
-level, each with K local/global iterations of a frame in a compiled loop of its own. Vertices are
-held, and contacts act at the end of a frame, as in the ordinary step loop.
+level. Each runs K local/global iterations of a frame in a compiled loop. Vertices are held, and
+contacts act at the end of a frame, as in the ordinary step loop.
 """
 
 from abc import abstractmethod
@@ -34,15 +34,15 @@ from pdrom.reduction.subspace.model import SubspaceModel
 WINDOW = 5  # number of earlier iterates in Anderson acceleration, as in Peng et al. 2018
 # Parameters of Chebyshev's semi-iteration: convergence rate of the plain iteration, and largest
 # number of plain iterations before the first extrapolation. Both are set by hand, as in Wang 2015.
-# Of five rates, this one is best in both of the compared scenes with a sheet: choosing it favours
-# this method.
+# Of five rates that were tried, this rate is best in both compared scenes with a sheet, so that the
+# choice favours this method.
 RATE = 0.98
 PLAIN = 5
-POWER = 100  # plain iterations after which two changes tell a rate
+POWER = 100  # number of plain iterations after which the rate is measured from two changes
 
 
 class Frame(NamedTuple):
-    """First arguments of a compiled loop over the iterations of a frame, in their order.
+    """First arguments of a compiled loop over the iterations of a frame, in this order.
 
     y, v : (4 N,) positions m and velocities m/s, changed in place: x, y, z and 0 of each vertex
     acceleration : (3,) m/s^2
@@ -74,21 +74,21 @@ class Alternative(Stepper):
         named = f"scene '{scene.config.name}', effect '%s': method '{self.name}' "
         for force in scene.forces:
             if not isinstance(force, Gravity):
-                raise SceneError(named % force.name + "takes no force but gravity")
+                raise SceneError(named % force.name + "supports no force other than gravity")
         step = scene.config.time_step
         super().__init__(scene.space(scene.system), step, iterations, scene.groups, False)
         kernels: list[Any] = [getattr(step, "local_kernel", None) for step in self.local_steps]
         for group, kernel in zip(scene.groups, kernels, strict=True):
             if kernel is None:
                 raise SceneError(named % group.name + "needs a compiled local step")
-        self.table = table_of(kernels)  # the local steps keep the kernels
+        self.table = table_of(kernels)  # the local steps keep references to the kernels
 
     def step(
         self, state: State, frame: int, on_last_iterate: Callable[[np.ndarray], None] | None = None
     ) -> tuple[State, FrameReport]:
         """Compute ``frame`` from ``state``; ``on_last_iterate`` is ignored.
 
-        The report has the time of the whole frame as that of the local step, and no objective.
+        The report counts the time of the whole frame as local step, and has no objective.
         """
         started = perf_counter()
         q = state.positions
@@ -115,7 +115,7 @@ class Alternative(Stepper):
         """Advance positions and velocities in place."""
 
     def _factor(self, part: Frame) -> Factor:
-        """Cholesky factor of the system matrix without the rows and columns of fixed vertices."""
+        """Return the Cholesky factor of the system matrix without rows of fixed vertices."""
         elimination = self.space.eliminate(part.fixed, part.targets)
         assert isinstance(elimination, Elimination)
         assert elimination.factor is not None
@@ -153,7 +153,7 @@ def end(y, before, step, v):
 
 
 def measured_rate(scene: Scene) -> float:
-    """Convergence rate of the plain iteration in the first frame, by power iteration."""
+    """Measure the rate of convergence of the plain iteration, by power iteration in frame 0."""
     loop, start = scene.iterated(POWER).stepper(track_objective=False), scene.initial_state()
     ends = []
     for count in range(POWER, POWER + 3):
@@ -164,9 +164,9 @@ def measured_rate(scene: Scene) -> float:
 
 
 class Chebyshev(Alternative):
-    """Chebyshev's semi-iteration, which extrapolates each iterate from the one before the last.
+    """Chebyshev's semi-iteration, which extrapolates each iterate from the last two iterates.
 
-    The first extrapolation follows `PLAIN` plain iterations, or a third of all.
+    The first extrapolation follows `PLAIN` plain iterations, or a third of all if that is less.
     """
 
     name = "chebyshev"
@@ -227,10 +227,10 @@ class TwoLevel(Alternative):
     def __init__(self, scene: Scene, iterations: int, model: SubspaceModel) -> None:
         super().__init__(scene, iterations)
         if len(scene.groups) != 1:
-            raise SceneError(f"scene '{scene.config.name}': method '{self.name}' takes one group")
+            raise SceneError(f"scene '{scene.config.name}': '{self.name}' supports only one group")
         columns, group = model.columns, scene.groups[0]
         system = self.space.system
-        # leave out the columns of vertices that are fixed in any frame: y is not corrected there
+        # leave out columns that move vertices fixed in any frame: y is not corrected there
         free = columns.B[:, columns.free]
         image = system.matrix @ free
         factor = linalg.cholesky(free.T @ image, lower=True)
@@ -271,7 +271,7 @@ def _two_level(
     for k in range(iterations):
         write(base, rhs)
         objective = add_all(table, y, rhs) + inertia_energy(y, s, inertia)
-        # 0: test also the iterate after the first correction, which may raise the objective
+        # 0: also test the iterate after the first correction, which may raise the objective
         if refuse(history, y, objective, 0):
             write(plain, y)
             continue
@@ -298,7 +298,7 @@ def _correct(coarse, start, image):
     write(first, z)
     forget(history)
     for _ in range(INNER):
-        refuse(history, z, np.nan)  # with nan as objective, which is unknown, no iterate is refused
+        refuse(history, z, np.nan)  # the objective is unknown; with nan, no iterate is refused
         for i in range(sampled):
             moved[i], forces[i] = x[i], 0.0
         _add_product(rows, z, moved)

@@ -1,1 +1,1 @@
-"""Hard cases: scenes with extreme input, and how reductions fare in them."""
+"""Run reductions in hard cases, which are scenes with extreme input."""

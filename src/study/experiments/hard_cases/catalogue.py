@@ -1,4 +1,4 @@
-"""Hard cases: scenes of extreme meshes, states or settings, listed in config/hard_cases.yaml."""
+"""Build the scenes of config/hard_cases.yaml, which have extreme meshes, states or settings."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ from pdrom.model.mesh.generators import bar, boundary, cloth
 from pdrom.model.mesh.types import Mesh
 from pdrom.model.scene import Scene, SceneConfig
 
-# Files in config, which the experiment declares as its inputs: the list, and meshes.
+# Files in config that the experiment declares as its inputs: the list of cases, and meshes.
 LIST, *FILES = (
     "hard_cases.yaml", "scenes/meshes/hard_disc.obj", "scenes/meshes/hard_starfish_shell.obj",
     "scenes/meshes/hard_starfish.vtu", "scenes/meshes/hard_torus.vtu",
@@ -25,13 +25,13 @@ SEED = 7
 
 @dataclass(frozen=True)
 class HardCase:
-    """A scene that is hard for a reason (``why``); keys of config/hard_cases.yaml are its fields.
+    """An entry of config/hard_cases.yaml: a scene, and the reason (``why``) that makes it hard.
 
     mesh : name of a mesh in `MESHES`
     start : arguments of `start_of`
-    bound : largest extent (longest side of the bounding box) that tests allow the full-order run,
-        relative to the largest one of start, rest shape and fixed vertices
-    uneven : whether masses span eight decades, in random order
+    bound : largest extent (longest side of the bounding box) that tests allow for the full-order
+        run, relative to the largest extent of start, rest shape and fixed vertices
+    uneven : True: masses span eight decades, in random order
     settings : further keys of the scene
     """
 
@@ -44,7 +44,7 @@ class HardCase:
     settings: dict[str, Any] = field(default_factory=dict)
 
     def scene(self) -> Scene:
-        """Build the scene; raise PdromError if it is refused."""
+        """Build the scene; raises PdromError if the scene is refused."""
         mesh, masses = MESHES[self.mesh](), None
         if self.uneven:
             order = np.random.default_rng(3).permutation(mesh.vertices)
@@ -85,10 +85,10 @@ def start_of(
     """Return the state in which a hard case begins: the rest shape, changed by each argument.
 
     mapped : matrix (3, 3), or its diagonal (3,), that maps positions about their centre
-    scrambled : vertices are at random in a cube of so many times the mesh's longest side
-    merged : every odd vertex is on the vertex before it, so that the edge between has no length
+    scrambled : side of a cube of random positions, relative to the longest side of the mesh
+    merged : every odd vertex is at the place of the vertex before it
     folded : the half with larger x is mirrored onto the half with smaller x
-    noise : standard deviation of noise in all coordinates, over the longest side
+    noise : standard deviation of noise in all coordinates, relative to the longest side
     raised : shift along y, m
     falling : speed of all vertices downwards, m/s
     meeting : speed downwards of vertices above the mean height, upwards of the others, m/s
@@ -121,14 +121,14 @@ def _changed(make: Callable[[], Mesh], factors: Any, offset: Any = (0.0, 0.0, 0.
 
 
 def _two_sheets(*offset: float) -> Mesh:
-    """Two sheets that are not connected, the second one moved by ``offset`` (x, y, z), m."""
+    """Make two sheets that are not connected; the second is moved by ``offset`` (x, y, z), m."""
     first, second = _sheet(), _changed(_sheet, 1.0, offset)
     cells = np.concatenate([first.triangles, second.triangles + first.vertices]).astype(np.int32)
     return Mesh(np.concatenate([first.points, second.points]), cells)
 
 
 def _one_sliver() -> Mesh:
-    """A bar with one vertex moved almost into the opposite face of one tetrahedron."""
+    """Make a bar with one vertex moved almost into the opposite face of a tetrahedron."""
     mesh = _bar()
     points = mesh.points.copy()
     corners = points[mesh.tetrahedra[1]]
@@ -138,7 +138,7 @@ def _one_sliver() -> Mesh:
 
 
 def _simplex(size: int) -> Mesh:
-    """A single triangle (``size`` 3) or tetrahedron (4)."""
+    """Make a single triangle (``size`` 3) or tetrahedron (4)."""
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])[:size]
     cells = np.arange(size, dtype=np.int32)[None]
     return Mesh(points, cells) if size == 3 else Mesh(points, boundary(cells), cells)

@@ -1,4 +1,4 @@
-"""Outcomes of reductions in hard cases (scenes with extreme input), and the expected outcomes."""
+"""Run reductions in hard cases (scenes with extreme input); explain the expected failures."""
 
 import logging
 from collections.abc import Mapping
@@ -34,11 +34,11 @@ HOLDS, NOTHING, NOT_TAKEN = "holds", "nothing to reduce", "not taken"
 R, K, TOLERANCE = 10, 6, 1e-2
 HRPD = HrpdSpec(dimension=20, samples=60)
 BASES = {"pod": ("full", "ecsw", "hrpd"), "skinning": ("full", "hrpd")}
-# Longest sides of a run's bounding box, as multiples of `Training.extent`: above the first, the run
-# blew up; above the second, it is distorted.
+# Limits for the longest side of a run's bounding box, as multiples of `Training.extent`: above the
+# first limit, the run blew up; above the second limit, it is distorted.
 BLOWUP, DISTORTED = 100.0, 3.0
 Model = SubspaceModel | ProjectionModel
-# Kinds of constraint manifolds on which the norm of projections is bounded, whatever the state.
+# Kinds of constraint manifolds on which the norm of projections is bounded for all states.
 BOUNDED = ("clamped", "length", "half sphere")
 Methods = Mapping[str, MethodSpec]
 log = logging.getLogger(__name__)
@@ -61,7 +61,7 @@ class Expectation(ConfigModel):
     """Hard cases in which a reduction fails, and the reason (``why``).
 
     fails : names of hard cases in which the reduction must fail
-    may_fail : names of hard cases in which it fails or not, depending on rounding errors
+    may_fail : names of hard cases in which rounding errors decide whether it fails
     """
 
     why: Annotated[str, Field(min_length=20)]
@@ -73,7 +73,7 @@ class Training:
     """Full-order run of a hard case, with snapshots of its first group, which is reduced.
 
     positions : (F + 1, N, 3) m, initial positions first
-    snapshots : projections (n, e p, 3) of every second frame, and the norm of their round-off
+    snapshots : projections (n, e p, 3) of every second frame, and the norm of their rounding errors
     extent : longest side (m) of the bounding boxes of all frames and of the rest shape
     """
 
@@ -87,16 +87,16 @@ class Training:
 
 
 def names(methods: Methods) -> list[str]:
-    """Names of all reductions: ``methods``, then those in position subspaces (such as pod-ecsw)."""
+    """List all reductions: ``methods``, then those in position subspaces (such as pod-ecsw)."""
     return [*methods, *(f"{basis}-{sampling}" for basis in BASES for sampling in BASES[basis])]
 
 
 def reduced_model(training: Training, name: str, methods: Methods) -> Model | None:
-    """Train the reduction ``name``; None if the projections are round-off, so that no mode is left.
+    """Train the reduction ``name``; None if the projections are rounding errors (no mode is left).
 
-    In a name such as "pod-ecsw", "full" evaluates all projections, "ecsw" only those of some
-    elements, "hrpd" fits all to those of some. Raises PdromError if the reduction refuses the
-    scene.
+    In a name such as "pod-ecsw", "full" evaluates all projections, "ecsw" the projections of some
+    elements, and "hrpd" interpolates all projections from some of them. Raises PdromError if the
+    reduction refuses the scene.
     """
     scene, group = training.scene, training.group
     if name in methods:
@@ -119,7 +119,7 @@ def reduced_model(training: Training, name: str, methods: Methods) -> Model | No
 
 
 def reduced_run(training: Training, model: Model) -> Rerun:
-    """Run the hard case with ``model``; it ends if its box exceeds `BLOWUP` times the full one."""
+    """Run the hard case with ``model``, at most until its extent exceeds `BLOWUP` x `extent`."""
     scene, start, (loop, _) = training.scene, training.start, model.loop(training.scene)
     if isinstance(model, SubspaceModel):
         start = reduced_state(scene, model.columns, start)
@@ -131,7 +131,7 @@ def reduced_run(training: Training, model: Model) -> Rerun:
 def row(
     training: Training, name: str, methods: Methods, expected: Mapping[str, Expectation]
 ) -> dict[str, Any]:
-    """Row of the run with the reduction ``name``: how it ended, and why if it failed."""
+    """Return the table row of the reduction ``name``: outcome of its run, reason of a failure."""
     try:
         model = reduced_model(training, name, methods)
         if model is None:
@@ -161,7 +161,7 @@ def row(
 class HardCases(ConfigModel):
     """Section ``hard_cases`` of the configuration.
 
-    cases : names of the hard cases that are run; without names, all
+    cases : names of the hard cases to run; default: all
     expected : reduction -> its expected failures; a reduction without an entry must never fail
     """
 
@@ -170,14 +170,14 @@ class HardCases(ConfigModel):
 
     @property
     def modules(self) -> list[str]:
-        """Classes ("module:attribute") of the hard cases' effects, for the job's fingerprint."""
+        """Classes ("module:attribute") of the effects in hard cases, for the job's fingerprint."""
         chosen = self.cases or cases()
         effects = {effect["effect"] for name in chosen for effect in cases()[name].effects}
         return sorted(EFFECTS[effect] for effect in effects)
 
 
 @experiment(
-    "Hard cases of every reduction",
+    "Hard cases with every reduction",
     reads={
         "listed": ProjectFile(tuple(f"config/{name}" for name in (LIST, *FILES))),
         "every_method": Setting("every_method"),
@@ -188,7 +188,7 @@ class HardCases(ConfigModel):
 def hard_cases(
     listed: list[Path], every_method: dict[str, MethodSpec], asked: HardCases, out: File
 ) -> None:
-    """Run hard cases with every reduction.
+    """Run hard cases with every reduction, and write their outcomes.
 
     ``listed`` only declares inputs of the job: the hard cases read these files themselves.
     """

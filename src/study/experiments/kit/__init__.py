@@ -1,1 +1,1 @@
-"""Helpers of experiments: settings, measurement of times, and files of runs and reductions."""
+"""Help experiments to read settings, measure times, and store runs and reductions."""

@@ -1,9 +1,9 @@
-"""Declaration of experiments, settings that several of them share, and scenes from files.
+"""Declare experiments, define settings that several of them share, and load scenes.
 
-The sensitivity floor of a scene is the relative difference, in each frame, between its full-order
-run and one from a slightly displaced start, the largest over several random displacements. The
-horizon is the first frame in which the floor exceeds a threshold: from this frame on, errors of
-reduced runs say nothing about a method.
+The sensitivity of a scene is the relative difference, in each frame, between its full-order run and
+a run from slightly displaced initial positions; it is the largest over several random displacements
+(`floor_of`). The predictability horizon is the first frame in which the sensitivity exceeds a
+threshold. From this frame on, errors of reduced runs do not show how accurate a method is.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,7 +25,7 @@ from study.artifact.reads import Read
 
 
 class Experiment(Artifact):
-    """An artifact whose function writes its files; functions of tables, figures return content."""
+    """An artifact whose function writes files; functions of tables and figures return content."""
 
 
 def experiment(
@@ -53,13 +53,13 @@ TRAIN = "train"
 FOM = "fom"  # method in tables: full-order run, with the scene's or another number of iterations
 ANDERSON = "fom-anderson"  # method in tables: full-order run with Anderson acceleration
 
-# names of those phases of a frame that belong to no effect
+# names of the phases of a frame that belong to no effect
 RIGHT, GLOBAL, REST = "right-hand side", "global solve", "rest of the frame"
 Count = Annotated[int, Field(ge=1, le=100_000)]
 Repeats = Annotated[int, Field(ge=1, le=1000)]
 Modes = Annotated[int, Field(ge=1, le=1000)]
 Parts = tuple[Annotated[float, Field(gt=0.0, lt=1.0)], ...]
-PARTS = (1 / 2, 1 / 3, 1 / 4)  # of the cells along a side: coarser meshes of a scene
+PARTS = (1 / 2, 1 / 3, 1 / 4)  # cells along a side of coarser meshes, relative to the scene's mesh
 Tolerance = Annotated[float, Field(gt=0.0, lt=1.0)]
 # Name of a scene -> factors by which the vertex count along each side of its mesh is multiplied.
 Sizes = dict[str, tuple[Annotated[float, Field(gt=0.0, le=100.0)], ...]]
@@ -68,7 +68,7 @@ Rank = Annotated[int, Field(ge=1, le=100_000)] | Literal["full"]
 
 
 class OfScene(ConfigModel):
-    """Base class of settings for one file; those that are texts (scene ...) are in its path."""
+    """Base class of settings for one file, whose path contains all settings that are texts."""
 
     scene: SceneName
 
@@ -79,31 +79,31 @@ class OfScene(ConfigModel):
 
 
 def floor_of(table: pd.DataFrame, scene: str, perturbation: float | str) -> np.ndarray:
-    """Sensitivity floor (F,) of a scene, by frame, for one size or name of the perturbation.
+    """Return the sensitivity (F,) of a scene, by frame, for a size or name of the perturbation.
 
-    The ``table`` of perturbed runs has columns scene, perturbation, frame and relative_difference;
-    the floor is the largest difference over its seeds, and empty without such runs.
+    The ``table`` of perturbed runs has columns scene, perturbation, frame and relative_difference.
+    The sensitivity is the largest difference over all seeds; it is empty without perturbed runs.
     """
     label = perturbation if isinstance(perturbation, str) else f"{perturbation:g}"
-    # if all perturbations are numbers, the column was read from its file as floats
+    # if all perturbations are numbers, pandas has read the column as floats
     rows = table[(table.scene == scene) & (table.perturbation.astype(str) == label)]
     return rows.groupby("frame").relative_difference.max().to_numpy(float)
 
 
 def horizon(floor: np.ndarray, threshold: float) -> int:
-    """First frame in which the sensitivity ``floor`` (F,) exceeds ``threshold``; F if none does."""
+    """Return the first frame in which the sensitivity (F,) exceeds ``threshold``; F if none."""
     above = np.flatnonzero(~(floor <= threshold))
     return int(above[0]) if len(above) else len(floor)
 
 
 def horizons(table: pd.DataFrame, perturbation: float | str, threshold: float) -> dict[str, int]:
-    """Map scenes to the first frame in which the floor (`floor_of`) exceeds ``threshold``."""
+    """Map scenes to the first frame in which the sensitivity exceeds ``threshold``."""
     scenes = table.scene.unique()
     return {s: horizon(floor_of(table, s, perturbation), threshold) for s in scenes}
 
 
 class Horizon(ConfigModel):
-    """Settings of the horizon of a scene, the frame before which runs are compared.
+    """Settings of the predictability horizon of a scene; only frames before it are compared.
 
     It is the first frame that a ``perturbation`` of the start changes by more than ``threshold``.
     """
@@ -112,7 +112,7 @@ class Horizon(ConfigModel):
     threshold: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
     def frames(self, perturbed: File, motion: str = TRAIN) -> int:
-        """Number of frames before runs in file ``perturbed`` differ by more than `threshold`."""
+        """Count the frames before runs in file ``perturbed`` differ by more than `threshold`."""
         label = self.perturbation if motion == TRAIN else motion
         spread = floor_of(read_table(perturbed.path), perturbed["scene"], label)
         return horizon(spread, self.threshold)
@@ -125,7 +125,7 @@ def resolve_ranks(ranks: Sequence[Rank], rank: int) -> list[int]:
 
 
 def scene_of(config: SceneConfig, mesh: File, run: str = TRAIN) -> Scene:
-    """Build the scene of ``config`` on its mesh; ``run`` is "train" or a held-out motion."""
+    """Build the scene of ``config`` on its mesh; ``run`` is "train" or a test trajectory."""
     chosen = config if run == TRAIN else config.heldout_variant(cast(HeldOutMotion, run))
     scene = Scene.build(chosen, load_mesh(mesh.path))
     scene.log_holds()
@@ -139,7 +139,7 @@ def positions_of(run: File, frames: int | None = None) -> np.ndarray:
 
 
 def perturbation_field(scene: Scene, size: float, seed: int) -> np.ndarray:
-    """Random vectors (N, 3) m from ``seed``, each as long as ``size`` times the mesh's extent."""
+    """Draw random vectors (N, 3) m by ``seed``, each ``size`` times the mesh's extent long."""
     field = np.random.default_rng(seed).standard_normal((scene.mesh.vertices, 3))
     return size * scene.mesh.extent * field / np.linalg.norm(field, axis=1, keepdims=True)
 
@@ -160,6 +160,6 @@ def varied(
         if isinstance(effect, GroupConfig) and effect.effect in config.reduce:
             effect = effect.model_copy(update={"weight": stiffness_ratio * effect.weight})
         effects.append(effect)
-    # numbers of training snapshots and other settings of the reduction are those of ``config``
+    # numbers of training snapshots and other settings of the reduction stay unchanged
     changes = {"time_step": time_step, "frames": count, "effects": tuple(effects)}
     return config.model_copy(update=changes)

@@ -1,4 +1,4 @@
-"""Times of single local steps, of each effect in a frame, and of frames without some effects.
+"""Time single local steps, each effect in a frame, and frames without some effects.
 
 Wrappers measure the times of effects, so that a normal run contains no timers.
 """
@@ -32,7 +32,7 @@ COLUMNS = [
 ]  # fmt: skip
 COSTS = ["scene", "effect", "elements", "ms_per_frame", "share"]
 LEFT_OUT = ["scene", "left_out", "groups", "elements", "ms_per_frame", "own_ms"]
-# Python methods that the step loop calls: a tuple each for groups, forces, boundaries, contacts.
+# Python methods that the step loop calls, for groups, forces, boundaries and contacts.
 _QUESTIONS = (
     ("begin_frame", "accumulate"), ("acceleration",),
     ("active", "held", "takes_hold", "anchor", "path"), ("apply",),
@@ -45,7 +45,7 @@ KERNEL, RECORD, SECONDS, CLOCK, SIZE = range(OWN, OWN + 5)
 def variant(
     scene: Scene, frames: int, labels: dict, steps: Sequence[LocalStep] | None = None
 ) -> Variant:
-    """Return a variant to be timed: ``scene`` in full order, with other local ``steps`` if given.
+    """Return a run to be timed: the full-order model, with other local ``steps`` if given.
 
     No objective is computed.
     """
@@ -56,11 +56,11 @@ def variant(
 def local_costs(
     scene: Scene, reduced: Mapping[tuple, ReducedLocalStep], states: np.ndarray, **often: int
 ) -> pd.DataFrame:
-    """Milliseconds of one evaluation of each reduced local step, and of the full one of its group.
+    """Time an evaluation (ms) of each reduced local step, and of the full step of its group.
 
     Times are means over ``states``. A row also has times of two phases of the reduced local step,
-    each measured separately: the dense product that yields the coefficients c of the modes, and the
-    sum of S^T W (mean + V c), which all elements enter.
+    measured separately: the dense product that gives the coefficients c of the modes, and the sum
+    S^T W (mean + V c) over all elements.
 
     reduced : (group, method, r) -> reduced local step of a group of ``scene``
     states : (n, N, 3) m, positions; the local steps prepare a frame that begins at states[0]
@@ -94,7 +94,7 @@ def _each(call: Callable[..., object], arguments: Sequence[tuple]) -> None:
 
 
 class Timed:
-    """Wrapper of an effect; adds up the time of the methods that the step loop calls.
+    """Wrapper of an effect that adds up the time of the methods that the step loop calls.
 
     local_kernel : for a constraint group, its kernel with a timer in compiled code; else None
     """
@@ -136,11 +136,11 @@ class Timed:
 
 
 def effect_costs(scene: Scene, frames: int, warmup: int, repeats: int) -> pd.DataFrame:
-    """Times per frame of the full-order run: effects, right-hand side, global solve, the rest.
+    """Time a frame of the full-order run: effects, right-hand side, global solve, the rest.
 
     The table has the columns `COSTS`; several effects of one name have one row. ``elements`` counts
-    the elements of a group, the vertices that pins or handles may fix, or else all vertices. Time
-    of the compiled local steps outside the groups' kernels counts as that of the right-hand side.
+    the elements of a group, the vertices that pins or handles may fix, or else all vertices. The
+    right-hand side includes the time of compiled local steps outside the groups' kernels.
     """
     questions = zip(_roles(scene), _QUESTIONS, strict=True)
     by_role: Any = [[Timed(effect, asked) for effect in role] for role, asked in questions]
@@ -165,7 +165,7 @@ def _roles(scene: Scene) -> tuple[Sequence[Effect], ...]:
 def _profile(
     loop: Stepper, scene: Scene, frames: int, stands: list[Timed], names: list[str]
 ) -> list[list[float]]:
-    """Milliseconds of each frame: total, each effect, right-hand side, global solve, the rest."""
+    """Return times of each frame, ms: total, effects, right-hand side, global solve, the rest."""
     state, rows = scene.initial_state(), []
     for frame in range(frames):
         for stand in stands:
@@ -191,10 +191,10 @@ def _elements(scene: Scene, name: str) -> int:
 
 
 def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
-    """Sets of effects to leave out: none; each single effect; for each group, all other groups.
+    """List the sets of effects to leave out: none; each effect; for each group, all other groups.
 
     The list is empty for a scene with a single constraint group, which cannot be left out. Effects
-    that only change the start, such as a kick, are never left out.
+    that only change the start, for example a kick, are never left out.
     """
     groups = scene.config.groups
     if len(groups) < 2:
@@ -209,10 +209,10 @@ def left_out_sets(scene: Scene) -> list[tuple[str, ...]]:
 def left_out(
     scene: Scene, costs: pd.DataFrame, frames: int, warmup: int, repeats: int
 ) -> pd.DataFrame:
-    """Times per frame of the scene built without some of its effects; columns are `LEFT_OUT`.
+    """Time a frame of the scene built without some of its effects; the columns are `LEFT_OUT`.
 
-    Column ``own_ms`` is the time that the effects left out take in the complete scene, from the
-    table ``costs`` by `effect_costs`.
+    Column ``own_ms`` is the time that the omitted effects take in the complete scene, from the
+    table ``costs`` of `effect_costs`.
     """
     sets = left_out_sets(scene)
     if not sets:

@@ -1,7 +1,7 @@
-"""Timing of step loops in new processes.
+"""Time step loops in new processes.
 
-Times depend on the addresses of arrays and code in a process, by more than repeats differ. Only new
-processes (`in_processes`) show this dependence, since a fork inherits the addresses.
+Times depend on the addresses of arrays and code in a process, which changes them more than repeats
+differ. Only new processes (`in_processes`) show this, because a fork inherits the addresses.
 """
 
 import logging
@@ -47,9 +47,9 @@ def in_processes(
 ) -> list[dict[str, Any]]:
     """Time all variants in several new processes; return a row per variant and process.
 
-    The processes run one after the other, each with the variants in a random order of its own. They
-    get the pickled functions ``cases``, which make the variants. Column ``processor_share`` is a
-    process's processor time over the time that has passed. PdromError if a process fails.
+    The processes run one after the other, each with the variants in another random order. They get
+    the pickled functions ``cases``, which make the variants. Column ``processor_share`` is the
+    processor time of a process relative to its duration. Raises PdromError if a process fails.
     """
     rows: list[dict[str, Any]] = []
     command = [sys.executable, "-m", planned.__name__, __name__]
@@ -64,7 +64,7 @@ def in_processes(
             if ended.returncode:
                 last = ended.stderr.strip().rpartition("\n")[2]
                 raise PdromError(
-                    f"a process that times frames ended with {ended.returncode}: {last}"
+                    f"a process that times frames failed (exit code {ended.returncode}): {last}"
                 )
             rows += pickle.loads(answer.read_bytes())
             log.info("process %d of %d", process, asked.processes)
@@ -72,8 +72,8 @@ def in_processes(
 
 
 def _in_this_process(given: str, answer: str, process: str) -> None:
-    """Time variants made by functions in pickle ``given``; write the rows to pickle ``answer``."""
-    with damaged_set_aside():  # a damaged file is renamed when read, as in the parent process
+    """Time variants made by the functions in the file ``given``; write rows to ``answer``."""
+    with damaged_set_aside():  # damaged files are renamed when read, as in the parent process
         cases, asked = pickle.loads(Path(given).read_bytes())
         variants = [variant for case in cases for variant in case()]
         order = np.random.default_rng(int(process)).permutation(len(variants))

@@ -1,4 +1,4 @@
-"""Reduced models of a scene, loaded from the files of the study."""
+"""Load reduced models of a scene from the files of the study."""
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -34,8 +34,8 @@ def stored_models(
 ) -> Iterator[tuple[Row, Model | None]]:  # fmt: skip
     """Yield labels (columns of tables) and model for each stored model.
 
-    First come those of each of ``samplings`` and each basis size r in ``ranks``, where the model is
-    None if the basis has fewer modes, then those in the files ``subspaces``. StorageError if the
+    First come the models of each of ``samplings`` and each basis size r in ``ranks`` (None if the
+    basis has fewer modes), then the models in the files ``subspaces``. Raises StorageError if the
     basis of samples is not among the files ``bases``.
     """
     for file in samplings:
@@ -43,7 +43,7 @@ def stored_models(
         wanted = {"scene": file["scene"], "group": file["group"], "basis": spec.basis_id}
         found = next((each for each in bases if each.labels == wanted), None)
         if found is None:
-            raise StorageError(f"{file.path}: its basis {spec.basis_id} is not in the files read")
+            raise StorageError(f"{file.path}: the job does not read its basis {spec.basis_id}")
         basis = load_basis(found.path)
         for r in kit.resolve_ranks(ranks, basis.rank):
             own: Row = {"group": file["group"], "method": file["method"], "r": r}

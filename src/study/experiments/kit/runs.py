@@ -1,4 +1,4 @@
-"""A run of a reduced model: its table row, and what is stored of it."""
+"""Run a reduced model, make its table row, and store the run."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ def store_series(
 ) -> float | None:
     """Store the deviations of a run from ``full``, and further ``series`` of its frames.
 
-    Return its largest energy relative to the full-order run; None if that is round-off.
+    Returns its largest energy relative to the full-order run; None if that is a rounding error.
     """
     apart = full.deviations(outcome)
     for name, values in {**apart, **series}.items():
@@ -37,10 +37,10 @@ def store_series(
 
 
 def store_end(store: h5py.Group, outcome: Rerun | None, r: int, every: int = 1) -> None:
-    """Store the size r of a run, how it ended, and positions in single precision.
+    """Store the size r of a run, its end, and positions in single precision.
 
-    Only frames whose number is a multiple of ``every`` are stored. The attribute ``marked`` tells
-    that the basis has fewer than r modes, so that nothing ran.
+    Only frames whose number is a multiple of ``every`` are stored. If the attribute ``marked`` is
+    True, the basis has fewer than r modes and the model was not run.
     """
     store.attrs.update(r=r, marked=outcome is None, every=every)
     if outcome is not None:

@@ -1,1 +1,1 @@
-"""Reduced runs: repeated, with one choice changed, or with bases computed from rounding errors."""
+"""Repeat reduced runs, change one choice of a method, or use bases made of rounding errors."""

@@ -1,4 +1,4 @@
-"""Experiment `repetitions`: repeated runs, a ladder of methods, and bases of rounding errors."""
+"""Make repeated runs, an ablation of methods, and runs with bases of rounding errors."""
 
 import logging
 from collections.abc import Iterable, Sequence
@@ -30,7 +30,7 @@ class Cell(ConfigModel):
     """Settings of runs that are repeated.
 
     sizes : basis sizes of the runs
-    varied : what differs in repetitions: initial positions, training frames, or held-out motion
+    varied : differences of repetitions: initial positions, training frames, or test trajectories
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)]
@@ -51,14 +51,14 @@ class RepetitionSection(Repetitions):
 
 
 class Repeated(Cell):
-    """A method, with its specification, whose runs are repeated in the job's scene and group."""
+    """A method, with its specification, to be repeated in the scene and group of the job."""
 
     method: str
     spec: MethodSpec
 
 
 class Options(ConfigModel):
-    """Settings for a scene and group; if ``own_ladder`` or ``own_noise`` is None: no such runs."""
+    """Settings for a scene and group; ``own_ladder`` or ``own_noise`` None: no such runs."""
 
     scene: SceneConfig
     repetitions: Repetitions
@@ -70,7 +70,7 @@ class Options(ConfigModel):
 
 
 @kit.experiment(
-    "Repeated runs of {scene}, {group} reduced",
+    "Repeated runs of {scene} with {group} reduced",
     reads={
         "mesh": paths.MESH,
         "fom": paths.TRAIN,
@@ -86,9 +86,9 @@ class Options(ConfigModel):
     },
 )
 def repetitions(settings: Options, **files: paths.File) -> None:
-    """Make repeated runs, runs by a list of methods, and runs with bases of rounding errors only.
+    """Make repeated runs, runs of an ablation, and runs with bases of rounding errors only.
 
-    All reduce one group of one scene. A table is empty if ``settings`` ask for no runs of its kind.
+    All reduce one group of one scene. A table is empty if ``settings`` contain no runs of its kind.
     """
     labels: Row = dict(files["out"].labels)
     runs = ReducedRuns(
@@ -124,6 +124,6 @@ def repetitions(settings: Options, **files: paths.File) -> None:
 def _write(
     rows: Iterable[Row], columns: list[str], file: paths.File, whole: Sequence[str] = ()
 ) -> None:
-    """Write a table whose columns ``whole`` have integers or nothing."""
+    """Write a table; its columns ``whole`` contain integers or are empty."""
     table = pd.DataFrame(list(rows), columns=columns)
     write_table(table.astype(dict.fromkeys(whole, "Int64")), file.path)

@@ -1,4 +1,4 @@
-"""A "ladder": methods ("rungs") from the published choices to sound ones, one change at a time."""
+"""Run an ablation (table ``ladder``) that turns the published method into a sound one in steps."""
 
 import logging
 from collections.abc import Iterator
@@ -25,16 +25,16 @@ Rungs = Annotated[tuple[MethodSpec, ...], Field(min_length=1)]
 
 
 class Ladder(Repetitions):
-    """Methods ("rungs") that differ in single choices; combinations of two choices (``square``).
+    """Ablation steps: methods that differ in one choice, or combine two choices (``square``).
 
-    r : basis size of all rungs (the numerical rank if that is smaller)
-    signs : number of repetitions of the first rung with other signs of the singular vectors
+    r : basis size of all ablation steps (the numerical rank if that is smaller)
+    signs : number of repetitions of the first step with other signs of the singular vectors
     repeated : scenes whose runs are repeated with other training frames
-    up : methods, the published one first, each with one more change; the last is called sound
-    down : methods that differ from the sound one in one choice each
-    square : methods with separate or with shared coefficients, which sample single rows or whole
-        elements, one or more for each mode, each at all ``sizes``; p single rows replace an element
-        of p rows, so that numbers of entries are equal
+    up : methods from the published method on, each with one more change; the last is called sound
+    down : methods that differ from the sound method in one choice each
+    square : methods with separate or shared coefficients and with sampled rows or elements, one or
+        more for each mode, each at all ``sizes``; p single rows replace an element of p rows, so
+        that numbers of sampled entries are equal
     """
 
     r: Annotated[int, Field(ge=1, le=100_000)] = 20
@@ -46,9 +46,9 @@ class Ladder(Repetitions):
     sizes: tuple[kit.Modes, ...] = ()
 
     def rungs(self, p: int) -> list[tuple[str, MethodSpec, int | None, int]]:
-        """List all runs as (setting; method; seed for the modes' signs or None; basis size r).
+        """List all runs as (direction; method; seed for the modes' signs or None; basis size r).
 
-        A setting is "up", "down", "signs" or "square", see `Ladder`. Elements have ``p`` rows.
+        A direction is "up", "down", "signs" or "square", see `Ladder`. Elements have ``p`` rows.
         """
         square = [
             method.model_copy(update={"oversampling": p * method.oversampling})
@@ -65,15 +65,15 @@ class Ladder(Repetitions):
 
 
 class LadderSection(Ladder):
-    """Section ``ladder``: all its methods are run for each reduced group of each of ``scenes``."""
+    """Section ``ladder``: its methods are run for each reduced group of each of ``scenes``."""
 
     scenes: tuple[str, ...] = ()
 
 
 def climb(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[Row]:
-    """Yield rows for runs of ``ladder``; ``short`` runs methods with other training frames.
+    """Yield a row for each ablation step; ``short`` runs methods with other training frames.
 
-    A method that occurs twice with the same size is run once.
+    A method that occurs twice with equal size is run once.
     """
     p, known = runs.data.rows_per_element, dict[tuple[MethodSpec, int | None, int], Row]()
     for direction, method, seed, r in ladder.rungs(p):
@@ -82,7 +82,7 @@ def climb(runs: ReducedRuns, short: ReducedRuns, ladder: Ladder) -> Iterator[Row
             continue
         size, rung = min(r, basis.rank), method.title if seed is None else f"signs {seed}"
         key = method.model_copy(update={"title": ""}), seed, size
-        # there is no reduction without modes, that is if all projections are rounding errors
+        # without modes there is no reduction: all projections are rounding errors
         for reduction in reductions(basis, method, [size] if size else []).values():
             if key not in known:
                 known[key] = _run(runs, reduction)
@@ -108,7 +108,7 @@ def _run(runs: ReducedRuns, reduction: Reduction) -> Row:
 
 
 def _scatter(rows: list[Row]) -> Row:
-    """Number of repetitions, and least, median and largest values over them."""
+    """Return the number of repetitions, and minimum, median and maximum of their results."""
     errors, gains = ([row[name] for row in rows] for name in ("error", "gain"))
     found = {"repetitions": len(rows), "error_median": float(np.median(errors))}
     found |= {"error_low": min(errors), "error_high": max(errors)}

@@ -1,4 +1,4 @@
-"""Runs with bases computed from projections that are only rounding errors."""
+"""Run models with bases computed from projections that are only rounding errors."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -28,7 +28,7 @@ COLUMNS = [
     "blowup_frame", "relative_error",
 ]  # fmt: skip
 ALL, PLANE, VERTEX = "all", "plane", "vertex"
-SIZE = 1e-15  # displacement of vertices, a few round-offs, over the mesh's longest side
+SIZE = 1e-15  # displacement of vertices (rounding errors), relative to the mesh's longest side
 Runs = list[tuple[Row, Rerun | None]]  # pairs (table row, run); equal initial positions
 Methods = dict[str, MethodSpec]
 
@@ -36,7 +36,7 @@ Methods = dict[str, MethodSpec]
 class NoiseRuns(ConfigModel):
     """Settings of runs with bases computed from projections that are only rounding errors.
 
-    They are the numbers of modes, and the number of randomly displaced initial positions.
+    ``sizes`` are numbers of modes; ``repetitions`` is the number of randomly displaced starts.
     """
 
     sizes: Annotated[tuple[kit.Modes, ...], Field(min_length=1)] = (6, 10, 20)
@@ -44,7 +44,7 @@ class NoiseRuns(ConfigModel):
 
 
 class Noise(NoiseRuns):
-    """Section ``noise`` of the configuration; ``cases``: scene -> the group that is reduced in it.
+    """Section ``noise`` of the configuration; ``cases``: scene -> its group that is reduced.
 
     Scenes that are not in the study are ignored.
     """
@@ -56,12 +56,12 @@ class Noise(NoiseRuns):
 def noisy_runs(
     scene: Scene, group: str, asked: NoiseRuns, methods: Methods, file: h5py.File
 ) -> list[Row]:
-    """Run a scene from perturbed starts, in full order and with bases of these runs' round-off.
+    """Run full-order models from perturbed starts, and reduced models with bases of these runs.
 
     Returns a row for each run with the ``group`` reduced by one of ``methods``. For each of the
-    `kinds` of perturbed start, ``file`` gets the reduced runs of one start, an HDF5 group each: of
-    the first start at which only some runs of a method blow up (`irregular`), else of the first.
-    No run has a size r above the rank: its row has no results and its HDF5 group ``marked`` = True.
+    `kinds` of perturbed starts, ``file`` gets the reduced runs from one start, an HDF5 group each:
+    the first start from which only some runs of a method blow up (`irregular`), else the first one.
+    A size r above the rank is not run: it has no results, and its HDF5 group is ``marked``.
     """
     rows = []
     for axes in kinds(scene):
@@ -89,19 +89,19 @@ def irregular(runs: Runs) -> bool:
 
 
 def kinds(scene: Scene) -> tuple[str, ...]:
-    """Names of the kinds of perturbed start of ``scene``, by the coordinates that are perturbed.
+    """Return the kinds of perturbed starts of ``scene``, by the coordinates that are perturbed.
 
-    The first kind perturbs all coordinates. For a flat mesh, the second one perturbs coordinates in
-    its plane only, and the third one also the normal coordinate of a single vertex.
+    The first kind perturbs all coordinates. For a flat mesh, the second kind perturbs coordinates
+    in its plane only, and the third kind also the normal coordinate of a single vertex.
     """
     return (ALL, PLANE, VERTEX) if np.ptp(scene.mesh.points, axis=0).min() == 0.0 else (ALL,)
 
 
 def roundoff_field(scene: Scene, axes: str, size: float, seed: int) -> np.ndarray:
-    """Random displacement (N, 3) m; ``axes`` is the kind of perturbed start, one of `kinds`.
+    """Draw a random displacement (N, 3) m; ``axes`` is the kind of perturbed start (`kinds`).
 
-    Every vertex moves by ``size`` times the mesh's longest side, before displacements that the kind
-    does not allow are removed. ``seed`` draws directions and, for kind `VERTEX`, the vertex.
+    Every vertex moves by ``size`` times the longest side of the mesh; then displacements that the
+    kind does not allow are set to 0. ``seed`` draws directions and, for kind `VERTEX`, the vertex.
     """
     field = kit.perturbation_field(scene, size, seed)
     if axes != ALL:
@@ -119,9 +119,9 @@ def _noisy(
     """Yield (row, run) of all reductions, with initial positions displaced by ``start`` (N, 3) m.
 
     The run is None at a size above the rank. The reductions are trained on projections of the
-    full-order run from this start, even if these are rounding errors: no mode is cut off. Where a
-    method has a system of equations for each axis, an axis in which nothing moves has one, too, as
-    published; in all other runs of the study, such an axis has none.
+    full-order run from this start, and no mode is removed even if it consists of rounding errors.
+    If a method has a system of equations for each axis, axes in which nothing moves have one, too,
+    as published; in all other runs of the study, they have none.
     """
     group, plan, frames = scene.group(name), scene.config.reduce[name], scene.config.frames
     reference, projections, _ = sets.recorded(scene, name, scene.initial_state(start))

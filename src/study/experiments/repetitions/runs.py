@@ -1,7 +1,7 @@
-"""Runs with one constraint group reduced, repeated with other arbitrary choices.
+"""Repeat runs with one constraint group reduced, each time with other arbitrary choices.
 
-A run depends on the training frames and on the last digits of the start. Repetitions with other
-choices show the scatter of its error.
+The error of a run depends on the training frames and on the last digits of the initial positions.
+Repetitions show how much it varies.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,12 +26,12 @@ from study.experiments.kit import base as kit
 from study.experiments.kit.runs import Row, run
 
 Varied = Literal["start", "training", "motions"]
-MOVED = 1e-10  # displacement of vertices in repetitions, over the mesh's longest side
-TRAINED_ON = (1, 2, 4, 8)  # numbers of training motions of bases that run held-out motions
+MOVED = 1e-10  # displacement of vertices in repetitions, relative to the mesh's longest side
+TRAINED_ON = (1, 2, 4, 8)  # numbers of training trajectories of bases that run test trajectories
 
 
 class Repetitions(ConfigModel):
-    """Settings of repeated runs: their number; random choices are drawn by the seeds 1, 2, ..."""
+    """Settings of repeated runs: their number; the seeds 1, 2, ... draw the random choices."""
 
     repetitions: kit.Repeats = 5
 
@@ -42,7 +42,7 @@ class ReducedRuns:
 
     data : snapshots of the group's projections
     full : the full-order run
-    end : first frame that is not compared, because perturbed full-order runs differ too much in it
+    end : first frame that is not compared (predictability horizon)
     """
 
     group: str
@@ -61,11 +61,11 @@ class ReducedRuns:
         self, method: MethodSpec, frames: int | None = None, signs: int | None = None,
         motions: int = 1,
     ) -> Basis:  # fmt: skip
-        """Return the basis for ``method``, from the snapshots of several training ``motions``.
+        """Return the basis for ``method``, trained on ``motions`` trajectories.
 
-        Of each of n motions, every n-th training snapshot is used. With a seed ``frames``, training
-        frames are drawn from all snapshots of the group; with a seed ``signs``, the signs of the
-        singular vectors are drawn.
+        Of each of n trajectories, every n-th training snapshot is used. The seed ``frames`` draws
+        training frames from all snapshots of the group; the seed ``signs`` draws the signs of the
+        singular vectors.
         """
         key = (method.basis_id, frames, signs, motions)
         if key not in self._bases:
@@ -78,7 +78,7 @@ class ReducedRuns:
 
     @cached_property
     def _trained(self) -> list[np.ndarray]:
-        """Training snapshots of the scene's own motion and of random variants of it."""
+        """Training snapshots of the scene's training trajectory and of random variants of it."""
         config, mesh = self.full.scene.config, self.full.scene.mesh
         frames, found = self.data.frames["train"], [self.data.train]
         for seed in range(1, max(TRAINED_ON)):
@@ -95,7 +95,7 @@ class ReducedRuns:
     def run(self, reduction: Reduction, offset: np.ndarray | None = None) -> tuple[Row, Rerun]:
         """Run with ``reduction``, start moved by ``offset`` (N, 3) m; return its row and the run.
 
-        The row's ``error`` is that over the frames before `end`, inf if the run stopped earlier.
+        ``error`` in the row is measured before frame `end`, and inf if the run stopped earlier.
         """
         labels = {"r": reduction.r, "gain": reduction.gain}
         row, outcome = run(self.full, ProjectionModel(self.group, reduction), labels, offset)
@@ -107,8 +107,8 @@ class ReducedRuns:
     ) -> list[Row]:
         """Return rows of all repetitions of ``method``, at each of ``sizes`` up to the rank.
 
-        ``varied`` tells if initial positions ("start") or training snapshots ("training") are drawn
-        at random.
+        ``varied`` selects the random choice: initial positions ("start") or training snapshots
+        ("training").
         """
         rows, offset, start = [], None, varied == "start"
         for seed in range(1, asked.repetitions + 1):
@@ -120,7 +120,7 @@ class ReducedRuns:
         return sorted(rows, key=lambda row: row["r"])
 
     def on_motions(self, method: MethodSpec, sizes: Sequence[int]) -> Iterator[Row]:
-        """Yield a row per number of training motions, size r and held-out motion."""
+        """Yield a row for each number of training trajectories, size r and test trajectory."""
         for count in TRAINED_ON:
             made = reductions(self.basis(method, motions=count), method, sizes)
             for reduction in made.values():
@@ -130,7 +130,7 @@ class ReducedRuns:
 
 
 def drawn(data: sets.SnapshotSet, seed: int) -> np.ndarray:
-    """Draw as many of all snapshots of ``data`` as are for training, n; result: (n, e p, 3)."""
+    """Draw n of all snapshots of ``data``, as many as it has for training; result: (n, e p, 3)."""
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
     chosen = np.random.default_rng(seed).choice(len(frames), len(data.train), replace=False)
     return np.concatenate([data.train, data.test])[chosen[np.argsort(frames[chosen])]]

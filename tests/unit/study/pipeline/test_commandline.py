@@ -118,7 +118,7 @@ def test_the_folder_of_a_configuration(files, settings, name):
 @pytest.mark.parametrize("name", ["a b", "../x", "", "a/b", "a" * 61])
 def test_a_name_that_is_no_folder_is_refused(name):
     for files, settings in (((), (f"study={name}",)), (("a b.yaml",), ())):
-        with pytest.raises(ConfigurationError, match=r"study = '.*': no name of a folder.* 60 at"):
+        with pytest.raises(ConfigurationError, match=r"study = '.*': cannot name a .* 60 let"):
             folders(files, settings)
 
 

@@ -168,5 +168,5 @@ def test_a_record_is_refused_if_code_or_a_scene_changed_since_it_was_frozen(
     assert made[RECORDED].replication.tolist() == 2 * ["first"] + 2 * ["second"]
     assert made[COMMITS].iloc[-1, -1] == made[COMMITS].iloc[-1, -2]
     monkeypatch.setattr(tracked, *change)
-    with pytest.raises(ConfigurationError, match=r"csv: second: frozen is '\w{16} \w{16}'"):
+    with pytest.raises(ConfigurationError, match=r"csv: second: the frozen code '\w{16} \w{16}'"):
         tracked.replication(tmp_path / "claims.csv")

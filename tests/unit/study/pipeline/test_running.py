@@ -45,7 +45,7 @@ def snakemake_lock() -> None:
 
 def test_the_second_process_names_the_first_whose_locks_go_with_it(other):
     snakemake_lock()
-    with pytest.raises(PdromError, match=rf"process {other.pid} on .* is at work"):
+    with pytest.raises(PdromError, match=rf"process {other.pid} on .* uses this folder"):
         running.hold()
     assert running.LOCK.read_text().startswith(f"process {other.pid} ")
     assert running.SNAKEMAKE_LOCKS.exists()

@@ -36,9 +36,9 @@ def test_a_whole_study_names_its_configuration_verdicts_and_results():
     said = dict(line.removeprefix("pdrom: ").split(": ", 1) for line in text.splitlines())
     for key, part in {
         "configuration": "config/default.yaml, ranks=[3]",
-        "verdicts (as published / beyond)": "C1 holds / depends, C2 fails / x",
+        "verdicts (as published / improved)": "C1 holds / depends, C2 fails / x",
         "manuscript": "paper/main.pdf, paper/supplement.pdf",
-        "as pages": "results/article/index.html",
+        "web pages": "results/article/index.html",
         "figures": "2 in results/figures",
         "tables": "1 in results/tables",
         "time": "of processor time",

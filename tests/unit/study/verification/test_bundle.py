@@ -49,7 +49,7 @@ def test_an_archive_holds_the_commit_and_the_results_in_equal_bytes(clone, tmp_p
 
 def test_changes_that_are_in_no_commit_are_refused(clone, tmp_path):
     (clone / "sub" / "text.md").write_text("other words\n")
-    with pytest.raises(ConfigurationError, match=r"in no commit: sub/text\.md; commit"):
+    with pytest.raises(ConfigurationError, match=r"uncommitted .* sub/text\.md; commit"):
         write_archive(clone, {}, tmp_path / "one")
     assert not (tmp_path / "one").exists()
 
@@ -59,5 +59,5 @@ def test_without_a_finished_run_the_command_is_named(tmp_path, monkeypatch, caps
     monkeypatch.setattr(Subject, "of", lambda *_: Subject(("--configfile", "a.yaml"), Folders()))
     assert command.bundle([]) is Status.MISSING
     assert (
-        "a run that succeeds writes it: ./reproduce --configfile a.yaml" in capsys.readouterr().out
+        "successful run writes it, run ./reproduce --configfile a.yaml" in capsys.readouterr().out
     )

@@ -52,7 +52,7 @@ def subject(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("reason", ["", "  \n"])
 def test_without_a_reason_nothing_is_updated(subject, reason):
-    with pytest.raises(ConfigurationError, match="say why"):
+    with pytest.raises(ConfigurationError, match="a reason"):
         update(subject, reason)
 
 
@@ -62,6 +62,6 @@ def test_from_missing_or_damaged_tables_nothing_is_updated(subject, tmp_path, co
     folder.mkdir(parents=True)
     if content:
         (folder / f"{min(declared())}.csv").write_text(content)
-    with pytest.raises(StorageError, match="not there or damaged"):
+    with pytest.raises(StorageError, match="missing or damaged"):
         update(subject, "a reason")
     assert not (tmp_path / "results" / "reference").exists()

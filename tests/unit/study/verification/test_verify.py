@@ -49,7 +49,7 @@ def test_a_verdict_that_times_have_changed_is_shown_and_not_judged(examination):
     lines = {line.name: line for line in examination.claims(examination.table("claims"))}
     assert lines["C1"].outcome is Outcome.NOT_COMPARABLE
     now = "does not hold" if slow else "holds"
-    assert f"found '{now}', which rests on times" in lines["C1"].text
+    assert f"found '{now}', which depends on times" in lines["C1"].text
     tables = [examination.table(name) for name in ("claims", "claims_tests", "claims_sensitivity")]
     assert [str(table) for table in tables if table.outcome is Outcome.DIFFERS] == []
 
@@ -70,7 +70,7 @@ def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject
     reference.write_bytes(kept)
     assert status == Status.MISSING
     assert not PAGE.exists()
-    assert "table error_budget: no reference, run verify --update" in printed
+    assert "table error_budget: no reference, to accept it, run verify --update" in printed
     for line, command in (
         ("table stability", "./reproduce --configfile config/tiny.yaml -- stability"),
         ("figure stability_map: not there", ""),

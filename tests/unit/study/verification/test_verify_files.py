@@ -136,20 +136,20 @@ def no_manifest(content, _):
 
 STUDY = "./reproduce --configfile 'my study.yaml'"
 AGAIN = f"run {STUDY}\n"
-RUN = f"; a run that succeeds writes it: {STUDY}\n"
+RUN = f"; every successful run writes it, run {STUDY}\n"
 # Change, what it changes, what is said of it.
 FAULTS = (
     (flipped, NAMES, f"NAME: damaged (its checksum differs); {AGAIN}3 of 4 files"),
     (flipped_before_a_later_run, NAMES[:1], "NAME: damaged"),
-    (forged, ("x\n3.0\n2.6\n", "", "a picture"), f"{NAMES[2]}: not what its inputs give; {AGAIN}"),
+    (forged, ("x\n3.0\n2.6\n", "", "a picture"), f"{NAMES[2]}: not made from its inputs; {AGAIN}"),
     (taken_out, NAMES, f"NAME: not in the manifest; {AGAIN}"),
     (foreign, ("../../secret", "/etc/hostname", "../paper/main.tex", "notes.md"),
-     ": no file of this study\n"),
+     ": not a file of this study\n"),
     (lost, NAMES, f"NAME: not there; {AGAIN}"),
     (lost_and_unlisted, NAMES[3:], f"NAME: not there; {AGAIN}"),
     (lost, ("results/manifest.json",), f"NAME: no such file{RUN}"),
     (lost, ("results/paper/.m.tex.blake2b",), f"{NAMES[3]}: damaged"),
-    (broken_maker, NAMES[2:3], f"NAME: not what its inputs give; {AGAIN}"),
+    (broken_maker, NAMES[2:3], f"NAME: not made from its inputs; {AGAIN}"),
     (no_manifest, ("{", '{"format": 1}', '{"format": 2, "file": {}}'), RUN),
 )  # fmt: skip
 
