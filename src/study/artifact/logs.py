@@ -85,7 +85,7 @@ def warnings_to(stream: TextIO | None, form: str = "pdrom: warning: %(message)s"
 class Usage(NamedTuple):
     """Seconds that a job took, its processor seconds (with child processes), and memory in MB.
 
-    The memory is the peak of the job or of one child, including libraries, which jobs share.
+    The memory is the peak of the job or of a child process, with libraries, which jobs share.
     """
 
     wall: float

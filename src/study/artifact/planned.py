@@ -28,7 +28,7 @@ PLAN, KEPT = Path(".snakemake/plan.json"), "PDROM_PLAN"
 
 @cache
 def kept() -> tuple[dict[str, tuple[str, str]], dict[str, int]]:
-    """Return what the plan has read: module -> path and text, and other file -> `changed`."""
+    """Return the files that the plan has read: module -> path, text; other file -> `changed`."""
     if place := os.environ.get(KEPT):
         return tuple(json.loads(Path(place).read_bytes()))
     root, found = Path(__file__).resolve().parents[2], {}

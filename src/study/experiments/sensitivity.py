@@ -1,9 +1,8 @@
 """Measure how full-order runs change with small perturbations or other settings (docs/study.md).
 
-A run whose initial positions are moved by 1e-10 of the mesh's size differs from the unchanged run.
-No reduced model can be expected to have a smaller error. Further runs have another linear solver
-(another order of summation), number of iterations or time step, or lack an effect; the forces of
-all effects are recorded.
+A run whose start is moved by 1e-10 of the mesh's size differs from the unchanged run. No reduced
+model can be expected to have a smaller error. Further runs have another linear solver (order of
+summation), number of iterations or time step, or lack an effect. Forces of effects are recorded.
 """
 
 from collections.abc import Iterator

@@ -1,8 +1,7 @@
 """Make and run models in position subspaces, with all, sampled or interpolated projections.
 
-Methods are called full, ecsw (energy-conserving sampling) and hrpd (interpolated projections). For
-a large scene, one job also makes the full-order runs, which no other job reads. `live` writes the
-models of a scene to a file that a web page loads.
+The methods are full, ecsw (energy-conserving sampling) and hrpd (interpolation). For a large scene,
+one job also makes the full-order runs. `live` writes models to a file that a web page loads.
 """
 
 import logging

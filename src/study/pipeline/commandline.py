@@ -66,7 +66,7 @@ class CommandLine:
         self.more = [*(() if cores else CORES), *(LINES if lines else ()), *OPTIONS]
         self.executor: str | None = found["executor"]
         for key, _, text in (setting.partition("=") for setting in self.settings):
-            with suppress(YAMLError):  # Snakemake takes such a value as a text
+            with suppress(YAMLError):  # Snakemake reads a value that is not YAML as text
                 require_as_written(text, "--config", key)
 
     @property

@@ -66,7 +66,7 @@ def _key(sources: Sequence[str]) -> str:
 
 @cache
 def memory() -> Memory:
-    """`Memory` of the data that earlier commands computed in this working directory."""
+    """Return the `Memory` of data that earlier commands computed in this working directory."""
     return Memory(Path(".cache/plan.json"))
 
 

@@ -40,7 +40,7 @@ UNCHANGED = Coarsen()
 
 
 def scene_names(root: Path) -> list[str]:
-    """Names of all scenes with a file in config/scenes below ``root``, sorted."""
+    """List the names of all scenes with a file in config/scenes below ``root``, sorted."""
     return sorted(path.stem for path in (root / "config" / "scenes").glob("*.yaml"))
 
 
@@ -114,10 +114,10 @@ def read_scene(root: Path, name: str, coarsen: Coarsen = UNCHANGED) -> SceneConf
 
 
 def scene_file(root: Path, name: str) -> Path:
-    """Path of the file of scene ``name`` below ``root``."""
+    """Return the path of the file of scene ``name`` below ``root``."""
     return root / "config" / "scenes" / f"{name}.yaml"
 
 
 def not_taken(scene: SceneConfig) -> list[str]:
-    """Names of the effects of a scene that a position subspace cannot represent."""
+    """List the names of a scene's effects that position subspaces cannot represent."""
     return [e.effect for e in scene.effects if not EFFECTS.load(e.effect).in_subspace]

@@ -21,7 +21,7 @@ ENDINGS = {
 
 
 def leave(number: int, _frame: object = None) -> NoReturn:
-    """Handle the signal ``number``: print one line, and end this process and the fork server."""
+    """Handle the signal ``number``: print one line, end this process and the fork server."""
     with suppress(OSError):  # the stream may be closed; sys.stderr may be redirected
         os.write(2, ending(number).encode())
     if "multiprocessing.util" in sys.modules:  # delete the folder with the fork server's socket

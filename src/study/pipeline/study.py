@@ -139,17 +139,17 @@ class Study:
 
     @property
     def is_full(self) -> bool:
-        """Whether the settings are those of config/default.yaml."""
+        """True if the settings are those of config/default.yaml."""
         return self.settings == self._full
 
     @property
     def is_own(self) -> bool:
-        """Whether this is a user's own study, without any scene of config/default.yaml."""
+        """True for a user's study, which has no scene of config/default.yaml."""
         return not {*self.settings.scenes} & {*self._full.scenes}
 
     @property
     def is_alone(self) -> bool:
-        """Whether this is a user's study that decides no claims and leaves out the full study."""
+        """True for a user's study without claims, which leaves out all about other scenes."""
         return self.is_own and not self.settings.claim_sets
 
     @property
@@ -158,7 +158,7 @@ class Study:
         return [(name, group) for name, scene in self.scenes.items() for group in scene.reduce]
 
     def mesh_of(self, scene: str) -> str:
-        """Identifier of the mesh of ``scene``."""
+        """Return the identifier of the mesh of ``scene``."""
         return self.scene(scene).mesh.identifier
 
     @property

@@ -48,7 +48,7 @@ def files(target: str, folders: Folders) -> list[str]:
 
 
 def check_targets(plan: Plan, targets: Iterable[str], rules: Iterable[Any]) -> None:
-    """Raise ConfigurationError if none of Snakemake's ``rules`` makes one of ``targets``."""
+    """Raise ConfigurationError for a target that none of Snakemake's ``rules`` makes."""
     for target in targets:
         if not any(target == rule.name or rule.is_producer(target) for rule in rules):
             known = [*plan.own_files, *plan.figures, *plan.tables, *(rule.name for rule in rules)]

@@ -83,8 +83,7 @@ def code_of_replication() -> str:
 def replication(claims: Path | None) -> dict[str, pd.DataFrame]:
     """Map files about the last replication to their content, with the verdicts in ``claims``.
 
-    If ``claims`` is None, record fingerprints only. Otherwise, raise ConfigurationError if they
-    show that code, rules or scenes have changed since.
+    Record only fingerprints if ``claims`` is None, or else raise ConfigurationError if they differ.
     """
     commits, code = pd.read_csv(COMMITS, dtype=str), code_of_replication()
     last, name = commits.index[-1], commits.replication.iloc[-1]

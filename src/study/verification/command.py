@@ -62,8 +62,8 @@ def parser() -> argparse.ArgumentParser:
         "verify", "Compare the results of the last run with the expected results.", EXIT_CODES
     )
     what = made.add_mutually_exclusive_group()
-    what.add_argument("--files", action="store_true", help="check that no file has changed")
-    what.add_argument("--update", action="store_true", help="replace the expected results by these")
+    what.add_argument("--files", action="store_true", help="check that files are unchanged")
+    what.add_argument("--update", action="store_true", help="make these the expected results")
     made.add_argument("--reason", default="", help=f"reason for --update, written to {LOG}")
     return made
 

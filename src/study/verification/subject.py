@@ -82,10 +82,10 @@ class Subject:
 
 def options_parser(command: str, about: str, epilog: str | None = None) -> argparse.ArgumentParser:
     """Return a parser for ``./reproduce command`` with the options --configfile and --config."""
-    last = "configuration of the results; default: that of the last run"
+    last = "configuration of the results (default: of the last run)"
     made = argparse.ArgumentParser(prog=f"./reproduce {command}", description=about, epilog=epilog)
     made.add_argument("--configfile", nargs="+", default=[], metavar="FILE", help=last)
-    made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="its settings")
+    made.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="more settings")
     return made
 
 

@@ -143,7 +143,7 @@ class Comparison(Processes):
     repeats: kit.Repeats = 1
 
     def pairs(self, method: Any, vertices: int) -> list[tuple[int, int]]:
-        """Pairs (substeps, iterations) of ``method`` that `affords` allows for ``vertices``."""
+        """List pairs (substeps, iterations) of ``method`` that `affords` allows on a mesh."""
         steps = self.steps.get(method, ())
         return [(n, k) for n, k in steps if self.affords(method, vertices * n * k)]
 
