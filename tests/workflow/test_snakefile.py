@@ -100,7 +100,7 @@ def test_a_fresh_clone_plans_the_whole_study_beside_a_run_and_starts_no_other(cl
     assert "Paper paper/main.pdf" in log
     total = int(re.search(r"^total +(\d+)$", log, re.MULTILINE)[1])
     assert total > 100
-    assert re.search(r"^pdrom: about \d+ min on 1 core$", log, re.MULTILINE)
+    assert re.search(r"^pdrom: expected time: about \d+ min, 1 core$", log, re.MULTILINE)
     missing = re.findall(r"Missing output files: ([^;\n]*)", log)
     made = {path for files in missing for path in files.split(", ")}
     wanted = {f"results/tables/{name}.csv" for name in declared()}

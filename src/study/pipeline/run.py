@@ -88,7 +88,7 @@ class Run:
             def forecast() -> None:
                 if work := expected_work(workflow, plan):
                     seconds, s = sum(work.values()) / cores, "s" * (cores > 1)
-                    sys.stdout.write(f"pdrom: {rounded(seconds)} on {cores} core{s}\n")
+                    sys.stdout.write(f"pdrom: expected time: {rounded(seconds)}, {cores} core{s}\n")
 
             atexit.register(forecast)
 
