@@ -33,7 +33,7 @@ class Failures(logging.Handler):
             said, log = self._said.pop(record.thread, ""), record.log[0]
             if errors := _ERROR.findall(written(log)):
                 self._lines.append(f"job {record.rule_name} failed: {errors[-1]}")
-            elif not record.indent:  # Snakemake indents all jobs of a failed batch, also finished
+            elif not record.indent:  # Snakemake indents all jobs of a failed batch, even finished
                 made = f"job {record.rule_name} failed while making {record.output[0]}"
                 self._lines.append(f"{made}: {said} (log: {log})")
 

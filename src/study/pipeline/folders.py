@@ -1,4 +1,4 @@
-"""Find the results folder of a configuration; every configuration has another folder."""
+"""Find the results folder of a configuration; each configuration has a different folder."""
 
 import re
 from collections.abc import Iterable

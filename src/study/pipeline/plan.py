@@ -42,7 +42,7 @@ log = logging.getLogger(__name__)
 
 
 def check_subspaces(study: Study) -> None:
-    """Warn of scenes that position subspaces cannot represent; refuse them in lists for these."""
+    """Warn of scenes that position subspaces cannot represent; refuse them in their sections."""
     outside = {
         name: effects
         for name, config in {**study.scenes, **study.online}.items()
@@ -189,8 +189,8 @@ class Plan:
     def holds(self, artifact: Artifact) -> bool:
         """Return whether the study has data for ``artifact`` (table, figure, page).
 
-        All studies except those with `Study.is_alone` have data for every artifact. Those lack data
-        for tables about claims, and if they have no file of the kind that is read first.
+        A user's study (`Study.is_alone`) lacks data for tables about claims, and for artifacts that
+        first read a kind of file that it does not have. All other studies have all data.
         """
         if not self.study.is_alone:
             return True
