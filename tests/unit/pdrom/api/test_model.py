@@ -262,14 +262,13 @@ def test_a_file_that_cannot_be_trusted_is_refused(model, tmp_path):
 
 
 def test_the_files_page_computes_a_frame_with_numpy_alone(model, tmp_path, monkeypatch):
-    """The script on the page of the library, of at most 40 lines."""
-    page = (ROOT / "docs" / "library.md").read_text("utf-8")
-    (script,) = re.findall(r"```python\n(import h5py.*?)```", page, re.DOTALL)
+    """The script beside the page of the library, of at most 40 lines."""
+    script = (ROOT / "docs" / "frame_of_a_model.py").read_text("utf-8")
     assert len(script.strip().splitlines()) <= 40
     monkeypatch.chdir(tmp_path)
     model.save("sheet.model.h5")
     names: dict = {}
-    exec(compile(script, "library.md", "exec"), names)
+    exec(compile(script, "frame_of_a_model.py", "exec"), names)
     expected = model.run(model.scene, solver="local_global").positions[1]
     assert names["positions"] == pytest.approx(expected, abs=1e-12)
 
