@@ -20,6 +20,7 @@ from study.verification.compare import folder_of, read_references
 from vocabulary import gone, known
 
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
+SHOWN = {"published": ("r", 20), "gappy": ("r", 20), TOLERANCE: ("k", 10)}  # in docs/teaser.png
 ADDING = ROOT / "docs" / "adding.md"
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
@@ -131,11 +132,7 @@ def test_the_numbers_of_the_readme_s_picture_are_those_of_the_expected_tables() 
     errors = [
         100.0 * runs.loc[(scene, method)].set_index(size).relative_error_within_horizon[modes]
         for scene in ("bar_release", "spring_oop")
-        for method, size, modes in (
-            ("published", "r", 20),
-            ("gappy", "r", 20),
-            (TOLERANCE, "k", 10),
-        )
+        for method, (size, modes) in SHOWN.items()
     ]
     caption = (ROOT / "README.md").read_text("utf-8").split("docs/teaser.png)")[1].split("*\n")[0]
     assert re.findall(r"([\d.]+) %", caption) == [f"{float(f'{e:.2g}'):g}" for e in errors]
