@@ -1,6 +1,6 @@
-"""pdrom: can POD + DEIM take over the local step of projective dynamics?
+"""Simulate elastic bodies with projective dynamics, and reduce the local step by POD and DEIM.
 
-Data flow, one direction only: scene -> mesh -> constraints -> full-order run -> snapshots -> basis
+Data flow in one direction: scene -> mesh -> constraints -> full-order run -> snapshots -> basis
 -> sampling -> reduced run -> tables -> figures -> paper.
 """
 

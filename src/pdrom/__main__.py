@@ -1,4 +1,4 @@
-"""``python -m pdrom``: the command line."""
+"""Command line of pdrom as ``python -m pdrom``."""
 
 from pdrom.command.main import main
 

@@ -1,4 +1,4 @@
-"""Declaration of a command of ``pdrom``, exit codes, and paths of a command's files."""
+"""Declaration of commands of ``pdrom``, exit codes, and checks of output paths."""
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
@@ -32,30 +32,30 @@ class Command:
 
 
 def text(metavar: str, what: str, **more: Any) -> dict[str, Any]:
-    """Keywords of an argument that is a text or several; ``what`` is its help."""
+    """Return argparse keywords of an argument that is text; ``what`` is its help."""
     return {"metavar": metavar, "help": what, **more}
 
 
 def number(default: float | None, what: str) -> dict[str, Any]:
-    """Keywords of an option that is a number, with its default value; None has no value."""
+    """Return argparse keywords of a numeric option; the help shows its ``default`` if not None."""
     shown = what if default is None else f"{what} ({default:g})"
     return {"type": int if isinstance(default, int) else float, "default": default, "help": shown}
 
 
 def flag(what: str) -> dict[str, Any]:
-    """Keywords of an option without a value."""
+    """Return argparse keywords of an option without a value."""
     return {"action": "store_true", "help": what}
 
 
 # Arguments that several commands have.
-SCENE = text("SCENE.yaml", "file of the scene")
-UNCHECKED = flag("read a run without a checksum inside (by an older pdrom) if it is sound")
+SCENE = text("SCENE.yaml", "scene file")
+UNCHECKED = flag("read a run without a checksum (of an older pdrom) if its data are valid")
 
 
 def require_output(path: str | Path, reads: Sequence[str], scene: "Scene | None" = None) -> None:
     """Refuse an output ``path`` that is one of the files ``reads``, or that pdrom may not write.
 
-    The first of ``reads`` is the file of the ``scene``; its mesh file is read, too.
+    The first of ``reads`` is the file of the ``scene``, whose mesh file is protected as well.
     """
     from pdrom.core.store import require_own
     from pdrom.model.mesh.config import MeshFile
@@ -63,5 +63,5 @@ def require_output(path: str | Path, reads: Sequence[str], scene: "Scene | None"
     if scene and isinstance(scene.config.mesh, MeshFile):
         reads = [*reads, str(scene.config.mesh.file(Path(reads[0]).parent))]
     if any(Path(path).resolve() == Path(read).resolve() for read in reads):
-        raise StorageError(f"{path}: would be overwritten, and is read by this command")
+        raise StorageError(f"{path}: this command reads the file; name another output")
     require_own(path)

@@ -1,4 +1,4 @@
-"""``pdrom cost SCENE.yaml``: settings of a scene, each with its error and its time."""
+"""``pdrom cost SCENE.yaml``: compare settings of a scene by error and time."""
 
 import argparse
 import sys
@@ -24,7 +24,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     scene, out = load_scene(arguments.scene), arguments.plot
     if out:
         if Path(out).suffix.lower() != ".png":
-            raise ConfigurationError(f"--plot {out}: the name of a picture ends in .png")
+            raise ConfigurationError(f"--plot {out}: only PNG is written; choose a name in .png")
         require_output(out, [arguments.scene, *arguments.coarser, *arguments.model], scene)
     table = cost(scene, arguments.coarser, arguments.model, Progress)
     sys.stdout.write(f"{shown(table, scene.config.frames)}\n")
@@ -32,12 +32,12 @@ def perform(arguments: argparse.Namespace) -> Status:
         with atomic_path(out, with_checksum=False) as temporary:
             mark = {"Software": MARK.decode()}
             plot_cost(table).savefig(temporary, format="png", dpi=150, metadata=mark)
-        sys.stdout.write(f"{out}: position error against time\n")
+        sys.stdout.write(f"{out}: plot of position error against time\n")
     return Status.DONE
 
 
 def shown(table: "pd.DataFrame", frames: int) -> str:
-    """Lines of a ``table`` by `pdrom.api.cost` of a scene with ``frames``, and what they mean."""
+    """Format the ``table`` of `pdrom.api.cost` for a scene of ``frames`` frames, with notes."""
     marked = table.best.map({True: "* ", False: "  "}) + table.setting
     width = marked.str.len().max()
     columns = {"  setting".ljust(width): marked.str.ljust(width)}
@@ -47,24 +47,24 @@ def shown(table: "pd.DataFrame", frames: int) -> str:
     busy, error = table.attrs["busy"], table.attrs["mesh_error"]
     lines = [
         table.assign(**columns)[[*columns]].to_string(index=False),
-        "* no other setting is as good in position error and time, and better in one of them",
-        f"errors against the converged step over {frames} frames; times of the first "
+        "* no other setting is as accurate (position error) and as fast, and better in one of them",
+        f"relative errors against converged time steps over {frames} frames; times of the first "
         f"{table.attrs['frames']} frames{', unreliable: other programs ran' * busy}",
     ]
     if error is not None:
-        what = f"estimated position error of the mesh itself: {error:.2g}"
-        lines.append(f"{what}; a setting with a smaller error is no nearer to the body")
+        what = f"estimated position error that is due to the mesh: {error:.2g}"
+        lines.append(f"{what}; a smaller error of a setting is no gain in accuracy")
     return "\n".join(lines)
 
 
 COMMAND = Command(
-    "Compare what iterations, coarser meshes and models of a scene cost, and their errors",
+    "Compare solver iterations, coarser meshes and reduced models of a scene by error and time",
     "pdrom cost bar.yaml --coarser coarse.msh --model bar.model.h5 --plot cost.png",
     {
         "scene": SCENE,
-        "--coarser": text("MESH", "coarser meshes (else grids are made)", nargs="+", default=[]),
-        "--model": text("MODEL", "files by pdrom train, of its mesh", nargs="+", default=[]),
-        "--plot": text("FILE", "picture of error against time (.png)"),
+        "--coarser": text("MESH", "coarser mesh files (default: grids)", nargs="+", default=[]),
+        "--model": text("MODEL", "reduced models from pdrom train", nargs="+", default=[]),
+        "--plot": text("FILE", "plot error against time (.png)"),
     },
     perform,
 )

@@ -1,6 +1,6 @@
-"""``pdrom COMMAND ...``: the parser, messages and exit codes; each command is a module of its own.
+"""``pdrom COMMAND ...``: the parser, messages and exit codes; each command is one module.
 
-A command's module declares its arguments as a `Command`; other modules are imported as it runs.
+The module declares its arguments as a `Command` and imports other modules when the command runs.
 """
 
 import argparse
@@ -19,17 +19,17 @@ from pdrom.core.environment import settle
 from pdrom.core.errors import INTERRUPTED, PdromError, choices, reason
 
 COMMANDS = ("new", "run", "train", "cost", "view", "show")
-CODES = """exit codes: 0 done; 1 faulty input, or a file that cannot be read or written;
-2 the command was not understood; 3 a reduced run blew up (its file is written all the
-same); 130 interrupted"""
+CODES = """exit codes: 0 success; 1 invalid input, or a file that cannot be read or written;
+2 invalid command line; 3 a reduced run blew up (its result is still written);
+130 interrupted"""
 
 
 def parser() -> argparse.ArgumentParser:
-    """Parser of the whole command line."""
+    """Return the parser of the whole command line."""
     plain = argparse.RawDescriptionHelpFormatter
     top = argparse.ArgumentParser(
         prog="pdrom",
-        description="Run and reduce scenes of projective dynamics, and look at what came out.",
+        description="Simulate elastic bodies by projective dynamics, and train reduced models.",
         epilog=f"{CODES}\n\nexample: pdrom new sheet.yaml && pdrom run sheet.yaml",
         formatter_class=plain,
     )
@@ -68,7 +68,7 @@ def run(arguments: Sequence[str]) -> int:
     except BaseException as error:
         cause: BaseException | None = error
         while cause and not isinstance(cause, KeyboardInterrupt):
-            cause = cause.__context__  # Numba, interrupted while it compiles, fails otherwise
+            cause = cause.__context__  # an interrupt during compilation raises Numba's errors
         if cause is None:
             raise
         sys.stderr.write("\npdrom: interrupted\n")
@@ -78,14 +78,14 @@ def run(arguments: Sequence[str]) -> int:
 def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
     top = parser()
     if arguments and arguments[0][:1] != "-" and arguments[0] not in COMMANDS:
-        top.error(f"no command '{arguments[0]}'{choices(arguments[0], COMMANDS)}")
+        top.error(f"unknown command '{arguments[0]}'{choices(arguments[0], COMMANDS)}")
     found, unknown = top.parse_known_args(arguments)
-    if hasattr(found, "runs"):  # argparse does not know files behind an option
+    if hasattr(found, "runs"):  # argparse does not assign files after an option
         found.runs += [word for word in unknown if word[:1] != "-"]
         unknown = [word for word in unknown if word[:1] == "-"]
     if unknown:
         known = re.findall(r"--[a-z-]+", found.parser.format_usage())
-        found.parser.error(f"not understood: {unknown[0]}{choices(unknown[0], known)}")
+        found.parser.error(f"unknown argument {unknown[0]}{choices(unknown[0], known)}")
     return found
 
 

@@ -20,46 +20,46 @@ if TYPE_CHECKING:
 
     from pdrom.model.mesh.types import Mesh
 
-# Density of a new scene: of cotton, kg/m^2 of a surface, and of water, kg/m^3 of a volume.
+# Density in a new scene: cotton for a surface, kg/m^2; water for a volume, kg/m^3.
 DENSITY = {2: 0.2, 3: 1000.0}
-# A hanging body is stretched by this part at its top. Bending's weight over strain's and extent^2.
+# Relative stretch of a hanging body at its top; weight of bending over strain weight x extent^2.
 STRETCH, BENDING = 0.02, 1e-6
 ENOUGH = 3  # smallest number of fixed vertices with which a body cannot turn about a line
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Write the scene that ``arguments`` name, with comments; an existing file is left alone."""
+    """Write the commented scene file that ``arguments`` name; never replace an existing file."""
     from pdrom.api.files import require_no_mesh
 
     if arguments.scene is None and arguments.mesh is None:
-        raise ConfigurationError("SCENE or --mesh is required: the file to write, or a mesh")
+        raise ConfigurationError("nothing to write: name a SCENE file, or a mesh by --mesh")
     path = Path(arguments.scene or Path(arguments.mesh).with_suffix(".yaml"))
     require_no_mesh(path)
     path = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
     merge = arguments.merge
     if merge and not arguments.mesh:
-        raise ConfigurationError("--merge: --mesh is required, whose vertices it merges")
+        raise ConfigurationError("--merge: no mesh to merge vertices of; add --mesh")
     file, mesh = _read(arguments.mesh, path, merge) if arguments.mesh else (None, None)
     text = template(path.stem, file, mesh, arguments.up, merge)
     try:
         with path.open("x", encoding="utf-8") as made:
             made.write(text)
     except FileExistsError:
-        raise ConfigurationError(f"{path}: there is such a file already; name another") from None
+        raise ConfigurationError(f"{path}: the file exists already; choose another name") from None
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be written ({reason(error)})") from error
-    sys.stdout.write(f"{path}: written; edit it, then: pdrom run {path}\n")
+    sys.stdout.write(f"{path}: written; edit it, then run: pdrom run {path}\n")
     return Status.DONE
 
 
 def template(
     stem: str, file: str | None = None, mesh: "Mesh | None" = None, up: str = "y", merge: float = 0
 ) -> str:
-    """Text of a scene file; the scene has a generated sheet, or the ``mesh`` read from ``file``.
+    """Return the text of a scene file with a generated sheet, or the ``mesh`` read from ``file``.
 
-    The scene is named after ``stem``, the name of its file; ``up`` is the upward axis of the mesh,
-    in which vertices that are closer than ``merge`` times the extent are merged. Numbers and sides
-    in examples fit the mesh.
+    The scene is named after ``stem``, the name of its file; ``up`` is the upward axis of the mesh.
+    Vertices that are closer than ``merge`` times the extent are merged. Numbers and sides in the
+    examples fit the mesh.
     """
     from pdrom.model.mesh.generators import Plane, cloth
     from pdrom.model.mesh.types import vertex_measures
@@ -103,13 +103,13 @@ def _along(axis: int, number: float) -> list[float]:
 
 
 def _read(file: str, scene: Path, merge: float) -> "tuple[str, Mesh]":
-    """Path of the mesh ``file`` relative to the folder of the ``scene`` file, and its mesh."""
+    """Return the path of the mesh ``file`` relative to the folder of ``scene``, and its mesh."""
     from pdrom.model.mesh.config import MeshFile
 
     folder = scene.resolve().parent
     inside = Path(file).parent.resolve() / Path(file).name
     if not inside.is_relative_to(folder):
-        required = f"required is a file below {folder}, the folder of the scene"
+        required = f"the mesh must be in or below {folder}, the scene's folder"
         raise ConfigurationError(f"--mesh {file}: {required}")
     keys = {"kind": "file", "path": inside.relative_to(folder).as_posix(), "merge": merge}
     config = validate(MeshFile, keys, f"--mesh {file}")
@@ -117,7 +117,7 @@ def _read(file: str, scene: Path, merge: float) -> "tuple[str, Mesh]":
 
 
 def _about(mesh: "Mesh") -> str:
-    """YAML comments with the size and position of the mesh, and the vertex counts of its sides."""
+    """Return YAML comments with size and position of the mesh and vertex counts of its sides."""
     from pdrom.model.mesh.checks import seams
 
     ends = zip("xyz", mesh.points.min(axis=0), mesh.points.max(axis=0), strict=True)
@@ -126,8 +126,8 @@ def _about(mesh: "Mesh") -> str:
     cells = f"{len(getattr(mesh, kind))} {kind}"
     sides = (f"{side} {len(vertices)}" for side, vertices in _sides(mesh).items())
     return (
-        f"# It has {mesh.vertices} vertices, {cells}, {seams(mesh)}; {', '.join(places)} (m).\n"
-        f"# Its sides, with the number of their vertices: {', '.join(sides)}.\n"
+        f"# Mesh of {mesh.vertices} vertices, {cells}, {seams(mesh)}; {', '.join(places)} (m).\n"
+        f"# Its sides, and their numbers of vertices: {', '.join(sides)}.\n"
     )
 
 
@@ -143,10 +143,10 @@ def _sides(mesh: "Mesh") -> "dict[str, np.ndarray]":
 
 
 def _held(mesh: "Mesh", up: int) -> tuple[str, str, list[float]]:
-    """Return YAML of vertices to pin and of others to move, and the position of a pinned one.
+    """Return YAML of vertices to pin and of others to move, and the position of a pinned vertex.
 
-    Pinned are the vertices of a side if at least `ENOUGH`, else `ENOUGH` at the top. The side is
-    one of the longest axis that has such sides; if this axis points up, the top is preferred.
+    Pin a side that has at least `ENOUGH` vertices, else the `ENOUGH` vertices at the top. The side
+    is normal to the longest axis that has one; if this axis points up, the top is preferred.
     """
     sides, lengths = _sides(mesh), mesh.points.max(axis=0) - mesh.points.min(axis=0)
     for axis in sorted(range(3), key=lambda i: (-lengths[i], i == up)):
@@ -161,7 +161,7 @@ def _held(mesh: "Mesh", up: int) -> tuple[str, str, list[float]]:
 
 
 def _floor(mesh: "Mesh", axis: int) -> str:
-    """YAML of a floor below the mesh by about half its longest side, where ``axis`` points up."""
+    """Return YAML of a floor about half the longest side below the mesh; ``axis`` points up."""
     lowest = float(mesh.points[:, axis].min())
     step = 10.0 ** math.floor(math.log10(mesh.extent))
     height = round(math.floor((lowest - mesh.extent / 2.0) / step) * step, 12)
@@ -173,12 +173,12 @@ def _floor(mesh: "Mesh", axis: int) -> str:
 
 
 COMMAND = Command(
-    "Write the file of a new scene, with comments",
+    "Write a commented scene file to start from",
     "pdrom new sheet.yaml --mesh sheet.obj",
     {
-        "scene": text("SCENE", "file to write; else beside the mesh", nargs="?"),
-        "--mesh": text("FILE", "mesh file (.obj, .vtu, .msh ...)"),
-        "--merge": number(0.0, "merge vertices that are closer than this part of its extent"),
+        "scene": text("SCENE", "file to write (default: next to the mesh)", nargs="?"),
+        "--mesh": text("FILE", "mesh (.obj, .vtu, .msh ...; default: a sheet)"),
+        "--merge": number(0.0, "merge vertices closer than this fraction of the mesh's extent"),
         "--up": {"choices": "xyz", "default": "y", "help": "axis of the mesh that points up (y)"},
     },
     perform,

@@ -11,9 +11,9 @@ EVERY = 0.2  # seconds between two updates of the line on a terminal
 
 
 class Progress:
-    """Line with the number of the frame, milliseconds per frame and the estimated time left.
+    """Show the number of the frame, milliseconds per frame and the estimated time left.
 
-    If ``stream`` is no terminal, a line is added after each tenth of the run ``name``.
+    If ``stream`` is no terminal, a line is added after each 10 % of the run ``name``.
     """
 
     def __init__(self, name: str, frames: int, stream: TextIO | None = None) -> None:

@@ -1,4 +1,4 @@
-"""``pdrom run SCENE.yaml``: a run in full order or with a model."""
+"""``pdrom run SCENE.yaml``: simulate a scene with the full-order or a reduced model."""
 
 import argparse
 import sys
@@ -23,10 +23,10 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.model.mesh.checks import seams
 
     file, scene = Path(arguments.scene), load_scene(arguments.scene)
-    part, whole = arguments.model, "only of runs in full order (without --model)"
+    part, whole = arguments.model, "only for full-order runs (without --model)"
     for wrong, fault in (
         (part and (arguments.start or arguments.frame is not None), f"--from, --frame: {whole}"),
-        (arguments.compare and not part, "--compare: only of runs with a model (--model)"),
+        (arguments.compare and not part, "--compare: only for reduced runs (with --model)"),
         (arguments.check and (part or arguments.start), f"--check: {whole}, and without --from"),
         (arguments.no_estimate and part, f"--no-estimate: {whole}"),
     ):
@@ -39,7 +39,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     model = load_model(part) if part else None
     reference = load(arguments.compare, arguments.unchecked) if arguments.compare else None
     if reference and not (reference.full_order and reference.scene.config == scene.config):
-        fault = f"{reference.title} is no run of this scene in full order"
+        fault = f"{reference.title} is no full-order run of this scene"
         raise ConfigurationError(f"--compare {arguments.compare}: {fault}")
     tick = Progress(scene.config.name, scene.config.frames)
     start = load(arguments.start, arguments.unchecked) if arguments.start else None
@@ -65,23 +65,23 @@ def _compared(model: "Model", made: "Run", reference: "Run") -> str:
     speed = model.speed(made.scene)
     busy = "; unreliable: other programs ran" if speed["busy"] else ""
     return (
-        f"{made.error(reference)}; {speed['speedup']:.2g} times as fast as the full order "
-        f"({speed['ms']:.3g} for {speed['full_ms']:.3g} ms a frame, measured now, in turn{busy})"
+        f"{made.error(reference)}; {speed['speedup']:.2g} times as fast as the full-order model "
+        f"({speed['ms']:.3g} against {speed['full_ms']:.3g} ms a frame, timed in turn{busy})"
     )
 
 
 COMMAND = Command(
-    "Run a scene in full order, or with a model by pdrom train",
+    "Simulate a scene with the full-order model, or with a reduced model from pdrom train",
     "pdrom run sheet.yaml --out sheet.h5",
     {
         "scene": SCENE,
-        "--model": text("MODEL", "file by pdrom train: the model runs the scene"),
-        "--compare": text("RUN.h5", "full-order run with which the model's run is compared"),
-        "--from": text("RUN.h5", "run that goes on in this scene", dest="start"),
-        "--frame": text("N", "after so many of its frames (all)", type=int),
-        "--out": text("FILE", "file to write (HDF5; SCENE.h5 or SCENE_MODEL.h5 without it)"),
-        "--check": flag("estimate its error by a second, finer run"),
-        "--no-estimate": flag("do not estimate errors of frames"),
+        "--model": text("MODEL", "reduced model from pdrom train"),
+        "--compare": text("RUN.h5", "full-order run to compare the reduced run with"),
+        "--from": text("RUN.h5", "run that this scene continues", dest="start"),
+        "--frame": text("N", "with --from: continue after N frames (default: all)", type=int),
+        "--out": text("FILE", "HDF5 file to write (default: SCENE.h5 or SCENE_MODEL.h5)"),
+        "--check": flag("estimate the error by a second run with more iterations"),
+        "--no-estimate": flag("do not estimate the error of every 20th frame"),
         "--unchecked": UNCHECKED,
     },
     perform,

@@ -1,6 +1,6 @@
-"""``pdrom show FILE``: print what a result file contains, how it was made, whether it is intact.
+"""``pdrom show FILE``: print the contents of a result, its origin, and whether it is intact.
 
-``pdrom show WORD`` explains a word of a scene's file.
+``pdrom show WORD`` explains a word of scene files.
 """
 
 import argparse
@@ -19,11 +19,11 @@ from pdrom.core.errors import ConfigurationError, StorageError, choices
 from pdrom.core.provenance import RECORD
 from pdrom.core.yamlfile import named, read_yaml, validate
 
-LONGEST = 100  # largest number of characters shown of an HDF5 attribute's value
+LONGEST = 100  # characters of an HDF5 attribute's value that are shown at most
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Print the contents of the file of ``arguments``, or about a word; no file is changed."""
+    """Print the contents of a file or explain a word; no file is changed."""
     from pdrom.core.store.checksum import check_file, provenance_of
 
     path = Path(arguments.file)
@@ -41,7 +41,7 @@ def perform(arguments: argparse.Namespace) -> Status:
             lines += _effects(_scene(path))
         case ".json":
             lines += (f"  {line}" for line in path.read_text("utf-8").splitlines())
-    lines.append("provenance:" if record else "provenance: unknown (no checksum says it)")
+    lines.append("provenance:" if record else "provenance: unknown (no valid checksum)")
     ordered = [name for name in dict.fromkeys((*RECORD, *record)) if name in record]
     lines += [f"  {name}: {record[name]}" for name in ordered]
     sys.stdout.write("\n".join(lines) + "\n")
@@ -49,9 +49,9 @@ def perform(arguments: argparse.Namespace) -> Status:
 
 
 def _explained(word: str) -> list[str]:
-    """Return lines about a word of a scene's file; ConfigurationError, with all words, for another.
+    """Return lines that explain a ``word`` of scene files; ConfigurationError if it is unknown.
 
-    They explain all that has this name, with its keys, and the keys of this name or value.
+    They explain everything of this name with its keys, and the keys of this name or value.
     """
     lines = list[tuple[str, list[str]]]()  # each with the words that it explains
     for form, keys in read_yaml(config_file("words.yaml")).items():
@@ -63,7 +63,7 @@ def _explained(word: str) -> list[str]:
     found = [line for line, words in lines if word in words]
     if not found:
         known = choices(word, dict.fromkeys(each for _, words in lines for each in words))
-        raise ConfigurationError(f"'{word}': no such file, and no word of a scene{known}")
+        raise ConfigurationError(f"'{word}': neither a file nor a word of scene files{known}")
     return found
 
 
@@ -76,7 +76,7 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
             found: list[str] = []
             file.visititems(lambda name, item: found.extend(_item(name, item)))
     except OSError as error:
-        raise StorageError(f"{path}: no readable HDF5 file ({error})") from error
+        raise StorageError(f"{path}: not a readable HDF5 file ({error})") from error
     yield "holds:"
     yield from found
     configuration = attributes.pop("configuration", None)
@@ -113,7 +113,7 @@ def _configuration(configuration: Any, whole: bool) -> Iterator[str]:
 
 
 def _scene(path: Path) -> dict[str, Any]:
-    """Return a scene's settings as they are understood, from its YAML file; {} of another file."""
+    """Return a scene's validated settings from its YAML file; {} if the file is no scene."""
     from pdrom.model.scene import SceneConfig
 
     keys = named(read_yaml(path), path.stem)
@@ -155,11 +155,11 @@ def _short(value: Any) -> str:
 
 
 COMMAND = Command(
-    "Say what a result is (content, units, provenance), or what a word of a scene's file means",
+    "Describe a result file (content, units, provenance), or explain a word of scene files",
     "pdrom show results/fom/spring_oop/train.h5",
     {
-        "file": text("FILE", "a result, or a word such as spring or scene"),
-        "--configuration": flag("the whole configuration, as YAML"),
+        "file": text("FILE", "result file, or a word such as spring or scene"),
+        "--configuration": flag("print the whole configuration, as YAML"),
     },
     perform,
 )

@@ -1,4 +1,4 @@
-"""``pdrom train SCENE.yaml``: a reduced model, with the table of its validation."""
+"""``pdrom train SCENE.yaml``: train a reduced model and print its validation."""
 
 import argparse
 import sys
@@ -9,7 +9,7 @@ from pdrom.core.errors import StorageError
 
 
 def perform(arguments: argparse.Namespace) -> Status:
-    """Train a model on the run of a scene and on further runs; print it with its validation."""
+    """Train a model on runs of a scene, save it, and print its validation and training time."""
     from pdrom.api import load, load_scene, run, train
     from pdrom.api.training import arguments as check
     from pdrom.command.progress import Progress
@@ -23,7 +23,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     check(scene, given | {"others": arguments.runs[1:]})
     runs = [load(path, arguments.unchecked) for path in arguments.runs]
     if runs and runs[0].scene.config != scene.config:
-        raise StorageError(f"{arguments.runs[0]}: a run of another scene than {arguments.scene}")
+        raise StorageError(f"{arguments.runs[0]}: not a run of {arguments.scene}; run it again")
     before = 0.0
     if not runs:
         runs = [run(scene, on_frame=Progress(scene.config.name, scene.config.frames))]
@@ -33,10 +33,10 @@ def perform(arguments: argparse.Namespace) -> Status:
     sys.stdout.write(f"{model.validation.to_string(index=False, float_format='%.3g')}\n")
     first, seconds = model.validation.iloc[0], before + model.training.seconds
     saved = first.ms * (first.speedup - 1.0)  # ms per frame
-    paid = f"paid back after {1e3 * seconds / saved:.0f} frames"
+    paid = f"as long as the model saves in {1e3 * seconds / saved:.0f} frames"
     sys.stdout.write(
         f"{out}: {model.title}; training took {seconds:.3g} s, "
-        f"{paid if saved > 0.0 else 'never paid back: the full order is at least as fast'}"
+        f"{paid if saved > 0.0 else 'but the full-order model is at least as fast'}"
         f"{' (times are unreliable: other programs ran)' * bool(model.validation.busy.any())}\n"
     )
     return Status.DONE
@@ -47,19 +47,19 @@ COMMAND = Command(
     "pdrom train bar.yaml --modes 40 --variations 3 --validate 2",
     {
         "scene": SCENE,
-        "runs": text("RUN.h5", "runs to train on, the first of SCENE (else made)", nargs="*"),
-        "--modes": number(40, "POD modes of the displacements"),
-        "--tolerance": number(0.01, "of the sampled elements"),
-        "--skinning": number(0, "skinning columns beside the modes"),
-        "--hold": text("SIDE", "sides that later scenes may hold, too", nargs="+", default=()),
-        "--variations": number(0, "random variations to train on"),
-        "--validate": number(0, "random variations to validate on"),
-        "--error": number(None, "choose the smallest of 20, 40, 80 modes within this error"),
-        "--unconverged": flag("train on frames of the scene's iterations, not on converged ones"),
-        "--method": text("M", "reduce a group's projections by this one of config/methods.yaml"),
-        "--group": text("G", "the group; needed if the scene has several"),
-        "--r": number(20, "their modes"),
-        "--out": text("FILE", "file to write (HDF5); SCENE.model.h5 without it"),
+        "runs": text("RUN.h5", "full-order runs, first of SCENE (default: run SCENE)", nargs="*"),
+        "--modes": number(40, "number of POD modes of the displacements"),
+        "--tolerance": number(0.01, "relative tolerance of the element sampling"),
+        "--skinning": number(0, "number of skinning columns added to the modes"),
+        "--hold": text("SIDE", "also let later scenes fix these sides", nargs="+", default=()),
+        "--variations": number(0, "number of random variations to train on"),
+        "--validate": number(0, "number of other random variations to validate on"),
+        "--error": number(None, "choose the fewest of 20, 40, 80 modes with at most this error"),
+        "--unconverged": flag("use the scene's iterations instead of converged training frames"),
+        "--method": text("M", "reduce projections instead, by a method of config/methods.yaml"),
+        "--group": text("G", "group whose projections are reduced (required if several exist)"),
+        "--r": number(20, "number of modes of the projections"),
+        "--out": text("FILE", "HDF5 file to write (default: SCENE.model.h5)"),
         "--unchecked": UNCHECKED,
     },
     perform,

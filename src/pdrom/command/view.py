@@ -1,4 +1,4 @@
-"""``pdrom view RESULT ...``: show runs, or a model that runs, in an HTML page or other files."""
+"""``pdrom view RESULT ...``: show runs, or a running model, in an HTML page or other files."""
 
 import argparse
 import sys
@@ -25,39 +25,39 @@ def perform(arguments: argparse.Namespace) -> Status:
     for path in written:
         require_output(path, [*arguments.runs, str(out)])
     if arguments.live and (written or len(arguments.runs) > 2):
-        raise ConfigurationError("--live: a model and at most one run, without --png and --vtk")
+        raise ConfigurationError("--live: give a model and at most one run, no --png or --vtk")
     model = load_model(first) if arguments.live else None
     runs = [load(file, arguments.unchecked) for file in arguments.runs[bool(model) :]]
     scenes = [] if model else viewed_scenes(*runs)
     if len(scenes) > 1 and written:
-        raise ConfigurationError("--png and --vtk: of one scene at a time")
+        raise ConfigurationError("--png and --vtk: give runs of one scene only")
     if model:
         model.view(out, *runs)
     else:
         write_page(scenes, out)
     size = out.stat().st_size / 1e6
-    sys.stdout.write(f"{out}: {size:.1f} MB; a browser opens it without a network\n")
+    sys.stdout.write(f"{out}: {size:.1f} MB; opens in a browser without a network\n")
     if arguments.png:
         write_frames(scenes[0], Path(arguments.png))
         sys.stdout.write(f"{arguments.png}: four frames of each run\n")
     if arguments.vtk:
         vtk(scenes[0], Path(arguments.vtk, "run.pvd"))
-        sys.stdout.write(f"{Path(arguments.vtk, 'run.pvd')}: opened by ParaView\n")
+        sys.stdout.write(f"{Path(arguments.vtk, 'run.pvd')}: open it in ParaView\n")
     if arguments.open and not webbrowser.open(out.resolve().as_uri()):
         sys.stderr.write("pdrom: no browser was found; open the file by hand\n")
     return Status.DONE
 
 
 COMMAND = Command(
-    "Write a page on which runs are looked at or a model runs, a picture, or files for ParaView",
+    "Show runs, or a model that runs in the browser, as a page, a picture or files for ParaView",
     "pdrom view pulled_sheet.h5 pulled.h5 --open",
     {
-        "runs": text("RESULT", "files of pdrom run", nargs="+"),
-        "--live": flag("run a model: its file, then a run as wires"),
-        "--out": text("FILE", "page to write; the first RESULT as .html"),
-        "--open": flag("open it in the browser"),
-        "--png": text("FILE", "picture of four frames of each run, too"),
-        "--vtk": text("FOLDER", "files for ParaView, too: one a frame, and run.pvd"),
+        "runs": text("RESULT", "files from pdrom run", nargs="+"),
+        "--live": flag("run a model in the page: give its file, then a run to show as wires"),
+        "--out": text("FILE", "page to write (default: the first RESULT, as .html)"),
+        "--open": flag("open the page in the browser"),
+        "--png": text("FILE", "also draw four frames of each run"),
+        "--vtk": text("FOLDER", "also write files for ParaView: one per frame, and run.pvd"),
         "--unchecked": UNCHECKED,
     },
     perform,

@@ -152,7 +152,7 @@ def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished,
     with h5py.File("small.h5", "r+") as file:
         del file["timings"]
     told = refusal(capsys, [*TRAIN, "small.h5", "--unchecked"])
-    assert told.startswith("pdrom: small.h5: holds no run that could be opened")
+    assert told.startswith("pdrom: small.h5: holds no complete run")
 
 
 def test_a_table_is_shown_with_what_its_columns_hold(folder, capsys):
@@ -170,7 +170,7 @@ def test_a_new_scene_is_valid_and_replaces_nothing(folder, capsys):
     (folder / "Two Words.yaml").write_text(re.sub("(?m)^(name|title): .*", "", text))
     config = load_scene("Two Words.yaml").config
     assert (config.name, config.title) == ("two_words", "Two words")
-    assert "there is such a file already" in refusal(capsys, ["new", "My Sheet-1.yaml"])
+    assert "the file exists already" in refusal(capsys, ["new", "My Sheet-1.yaml"])
     assert (folder / "My Sheet-1.yaml").read_text("utf-8") == text
 
 
@@ -210,7 +210,7 @@ def test_an_open_seam_is_named_and_merged(folder, capsys, caplog):
     assert "`merge: 1.0e-06` below `mesh`" in refusal(capsys, ["new", "b", "--mesh", "b.obj"])
     (folder / "c.obj").write_text(SEAM.format(0, 1).replace("f 1", "v 9 9 9\nf 1"))
     assert "leaves them out" in refusal(capsys, ["new", "c", "--mesh", "c.obj"])
-    assert "--mesh is required" in refusal(capsys, ["new", "c", "--merge", "1e-6"])
+    assert "add --mesh" in refusal(capsys, ["new", "c", "--merge", "1e-6"])
     for name in "abc":
         assert run(["new", f"{name}2", "--mesh", f"{name}.obj", "--merge", "1e-6"]) == Status.DONE
         assert run(["run", f"{name}2.yaml"]) == Status.DONE
@@ -229,7 +229,7 @@ def test_a_new_scene_tells_of_its_mesh(folder, capsys):
     scene = load_scene("in/no.yaml")
     (floor,) = [effect for effect in scene.config.effects if effect.effect == "floor"]
     assert -9.0 < floor.height <= -7.5
-    for mesh, words in (("../../x", "required is a file below"), ("none", "no such mesh file")):
+    for mesh, words in (("../../x", "the mesh must be in or below"), ("none", "no such mesh file")):
         assert words in refusal(capsys, ["new", "other", "--mesh", f"in/{mesh}.obj"])
     assert not (folder / "other.yaml").exists()
 
@@ -268,7 +268,7 @@ def test_a_new_sheet_sags_alike_if_it_is_refined():
 def test_a_mesh_in_place_of_a_scene_is_named_with_the_command_that_helps(folder, suffix, capsys):
     mesh = f"a{suffix}"
     write_mesh(Path(mesh))
-    told = f"pdrom: {mesh}: this is a mesh: `pdrom new --mesh {mesh}` makes a scene of it"
+    told = f"pdrom: {mesh}: a mesh, not a scene; `pdrom new --mesh {mesh}` writes a scene for it"
     for command in (["run", mesh], ["train", mesh], ["new", mesh]):
         assert refusal(capsys, command) == told
     assert run(["new", "--mesh", mesh]) == Status.DONE
@@ -310,16 +310,16 @@ FAULTY = [
     (["show", "sprng"], "did you mean 'spring'?"),
     (["new", "nowhere/x"], "No such file"),
     (["show", "."], "is a folder"),
-    (["run", "folder.h5"], "folder.h5: this is a result: `pdrom show folder.h5`"),
+    (["run", "folder.h5"], "folder.h5: a result, not a scene; see `pdrom show folder.h5`"),
     (["run", "."], ".: a folder, name a file in it"),
     ([*TRAIN, "--out", "small.yaml"], "is read by this command"),
-    (["run", "small.yaml", "--compare", "small.h5"], "--compare: only of runs with a model"),
+    (["run", "small.yaml", "--compare", "small.h5"], "--compare: only for reduced runs"),
     (["train", "small.yaml", "--modes", "4", "--r", "3"], "r: no effect without group or method"),
     (["run", "small.yaml", "--model", "none.h5"], "none.h5: no such file"),
     (["run", "small.yaml", "--frame", "3"], "--frame: only with --from"),
-    (["run", "small.yaml", "--from", "x.h5", "--model", "x.h5"], "only of runs in full order"),
+    (["run", "small.yaml", "--from", "x.h5", "--model", "x.h5"], "only for full-order runs"),
     (["run", "small.yaml", "--from", "small.h5"], "is read by this command"),
-    (["run", "small.yaml", "--model", "none.h5", "--check"], "--check: only of runs in full"),
+    (["run", "small.yaml", "--model", "none.h5", "--check"], "--check: only for full-order runs"),
     (["run", "small.yaml", "--out", "."], ".: cannot be written (a folder)"),
     (["view", "x.h5", "--png", "x.h5"], "is read by this command"),
 ]
@@ -331,7 +331,7 @@ def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, c
     assert run(["new", "own.yaml", "--mesh", "m.obj"]) == Status.DONE
     for scene, out, words in (
         ("small.yaml", "mine.h5", "cannot be written (a file that pdrom has not made"),
-        ("own.yaml", "m.obj", "would be overwritten, and is read by this command"),
+        ("own.yaml", "m.obj", "this command reads the file; name another output"),
     ):
         before = Path(out).read_bytes()
         for command in (["run", scene], ["train", scene, "none.h5"]):
@@ -388,7 +388,7 @@ def test_faults_that_a_run_meets_are_told(folder, finished, capsys):
     shutil.copy(finished / "small.h5", folder)
     assert "r = 99" in refusal(capsys, [*TRAIN, "small.h5", "--r=99"])
     (folder / "small.yaml").write_text(SMALL.replace("1.0e+5", "2.0e+5"))
-    assert "a run of another scene" in refusal(capsys, [*TRAIN, "small.h5"])
+    assert "not a run of" in refusal(capsys, [*TRAIN, "small.h5"])
 
 
 def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):
