@@ -1,4 +1,4 @@
-"""pdrom from Python: build a scene, run it, train a model, run this, draw the results.
+"""Build scenes in Python, simulate them, train and run reduced models, and draw the results.
 
 docs/library.md has a worked example.
 """

@@ -1,4 +1,4 @@
-"""Settings of a scene, from iterations to coarser meshes and models, by error and time."""
+"""Comparison of iterations, coarser meshes and models of a scene by error and time."""
 
 import logging
 import os
@@ -27,12 +27,12 @@ from pdrom.reduction.settings import Setting
 from pdrom.reduction.subspace.model import SubspaceModel, reduced
 
 log = logging.getLogger(__name__)
-# Iterations of a frame and window of Anderson acceleration (0: none), on coarser meshes fewer.
+# Pairs (iterations of a frame, window of Anderson acceleration or 0); fewer on coarser meshes.
 COUNTS = ((1, 0), (2, 0), (3, 0), (5, 0), (10, 0), (5, 5), (10, 5))
 ON_COARSER = ((2, 0), (5, 0), (5, 5))
-PARTS = (1 / 2, 1 / 3, 1 / 4)  # of the cells along a side of a generated grid
-ITERATIONS = 5  # of models, if they do not converge
-FRAMES, REPEATS = 60, 3  # most frames that are timed, and runs of them
+PARTS = (1 / 2, 1 / 3, 1 / 4)  # cells along a side of a coarser grid, relative to a generated grid
+ITERATIONS = 5  # of a model in a frame that is not solved to convergence
+FRAMES, REPEATS = 60, 3  # largest number of timed frames, and timed runs
 ERRORS = ["position_error", "deformation_error"]
 
 
@@ -45,18 +45,18 @@ def cost(
     """Compare iterations, coarser meshes and models of a scene by error and time.
 
     scene : scene made by `build_scene` or `load_scene`
-    coarser : meshes with fewer vertices, or their files; without any, a scene on a generated grid
-        gets those with a half, a third and a quarter of its cells along a side
+    coarser : meshes with fewer vertices, or their files; by default, a scene on a generated grid
+        gets grids with a half, a third and a quarter of its cells along a side
     models : models of the scene's mesh, or their files
     progress : called with name and number of frames of the converged run; returns a function that
         is called after each frame
 
-    Returns a table, cheapest first: ``setting`` in words, ``method``, ``iterations`` of a frame
-    (NA: converged), ``vertices`` that are simulated, `ERRORS` against the converged step (NaN of a
-    rigid body, inf: blew up), ``ms`` per frame, ``best`` (no other setting is as good in position
-    error and time and better in one). ``attrs`` are ``frames`` that were timed, ``busy`` (other
-    programs ran: times mean nothing), ``mesh_error`` (see `error_of_mesh`). Raises PdromError for a
-    wrong argument or file, a model of another mesh, no convergence, no motion.
+    Returns a table, fastest first: ``setting`` in words, ``method``, ``iterations`` of a frame
+    (NA: converged), ``vertices`` that are simulated, `ERRORS` against converged time steps (NaN: a
+    rigid body, inf: blew up), ``ms`` per frame, ``best`` (Pareto-optimal in position error and
+    time). ``attrs``: number of timed ``frames``, ``busy`` (times are unreliable, since other
+    programs ran), ``mesh_error`` (see `error_of_mesh`). Raises PdromError if an argument or file is
+    invalid, a model has another mesh, a frame does not converge, or nothing moves.
     """
     files.require_runnable(scene, None, progress, "progress")
     for given, what in ((coarser, "coarser"), (models, "models")):
@@ -96,7 +96,7 @@ def cost(
 
 @contextmanager
 def _naming(given: Any) -> Iterator[None]:
-    """Begin messages of errors about ``given`` with its name if it is a file."""
+    """Begin messages of errors about ``given`` with its path if it is a file."""
     path = None if isinstance(given, (Mesh, Model)) else files.file_path(given)
     try:
         yield
@@ -108,7 +108,7 @@ def _naming(given: Any) -> Iterator[None]:
 
 
 def _coarser(scene: Scene, given: Any) -> Coarser:
-    """Return ``scene`` on the mesh ``given``, or in this file, read as the scene's own file is."""
+    """Return ``scene`` on the mesh ``given``; a file is read with the scene's mesh settings."""
     own, path = scene.config.mesh, Path() if isinstance(given, Mesh) else files.file_path(given)
     like = own if isinstance(own, MeshFile) else MeshFile(kind="file", path="any")
     file = like.model_copy(update={"path": path.name})
@@ -117,13 +117,13 @@ def _coarser(scene: Scene, given: Any) -> Coarser:
 
 
 def _grids(scene: Scene) -> list[Coarser]:
-    """Return ``scene`` on coarser grids of different sizes, without those that do not suit it."""
+    """Return ``scene`` on coarser grids; leave out grids on which it cannot be built."""
     found: dict[int, Coarser] = {}
     for part in PARTS:
         try:
             found |= {each.scene.mesh.vertices: each for each in grids(scene, [part])}
         except PdromError as error:
-            log.warning("without the grid of %.2g times the cells a side: %s", part, error)
+            log.warning("leaving out the grid with %.2g of the cells along a side: %s", part, error)
     return [*found.values()]
 
 
@@ -141,7 +141,7 @@ def _full_order(scene: Scene, meshes: Sequence[Coarser]) -> Iterator[Setting]:
 
 
 def _of_model(scene: Scene, given: Any, number: int) -> Iterator[Setting]:
-    """Yield settings of a model or its file; one that cannot run ``scene`` raises an error."""
+    """Yield settings of a model or its file; raise an error if it cannot run ``scene``."""
     own = isinstance(given, Model)
     model, name = (given, number) if own else (load_model(given), files.file_path(given).name)
     for count, solved in ((ITERATIONS, f"{ITERATIONS} iterations"), (None, "converged")):

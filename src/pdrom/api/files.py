@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 
 def require(kind: type[T], value: Any, name: str, source: str) -> T:
-    """Return ``value``, or raise ConfigurationError if it is no ``kind``, as ``source`` makes."""
+    """Return ``value``; ConfigurationError, with the hint ``source``, if it is not a ``kind``."""
     if isinstance(value, kind):
         return value
     fault = f"a {kind.__name__} is required ({source})"
@@ -34,15 +34,15 @@ def require(kind: type[T], value: Any, name: str, source: str) -> T:
 
 
 def require_run(value: Any, name: str) -> Run:
-    """Return ``value`` if it is a run; SnapshotError if it is a run that is not finite."""
-    run = require(Run, value, name, source="run, Model.run and load make one")
+    """Return ``value`` if it is a run, with finite numbers; SnapshotError if they are not."""
+    run = require(Run, value, name, source="made by run, Model.run or load")
     run.require_finite(name)
     return run
 
 
 def require_runnable(scene: Any, out: Any, function: Any, name: str = "on_frame") -> None:
-    """Raise ConfigurationError or StorageError unless a run can have these arguments."""
-    require(Scene, scene, "scene", source="build_scene and load_scene make one")
+    """Check the arguments of a run; ConfigurationError or StorageError for an invalid one."""
+    require(Scene, scene, "scene", source="made by build_scene or load_scene")
     try:
         signature(function).bind(0, None)
     except (TypeError, ValueError) as error:
@@ -74,17 +74,17 @@ def require_no_mesh(path: Path) -> None:
     """Raise ConfigurationError if the file ``path`` is a result or a mesh, not a scene."""
     kind, name = path.suffix.lower() * path.is_file(), quote(str(path))
     if kind in (".h5", ".hdf5"):
-        raise ConfigurationError(f"{path}: this is a result: `pdrom show {name}` says which")
+        raise ConfigurationError(f"{path}: a result, not a scene; see `pdrom show {name}`")
     if kind in READERS:
-        made = f"`pdrom new --mesh {name}` makes a scene of it"
-        raise ConfigurationError(f"{path}: this is a mesh: {made}")
+        made = f"`pdrom new --mesh {name}` writes a scene for it"
+        raise ConfigurationError(f"{path}: a mesh, not a scene; {made}")
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:
     """Read the scene that the YAML file ``path`` describes, with its mesh.
 
-    A relative path of a mesh file starts at the folder of the YAML file. ConfigurationError names
-    the file, the key and the fault.
+    A relative path of a mesh file is relative to the folder of the YAML file. Raises
+    ConfigurationError, which names the file, the key and the fault.
     """
     path = file_path(path)
     require_no_mesh(path)
@@ -93,11 +93,11 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: Any) -> Scene:
-    """Build a scene, with its mesh, from keywords, which are the keys of a scene's YAML file.
+    """Build a scene from keyword arguments, which are the keys of a scene's YAML file.
 
-    ConfigurationError names the key and the fault.
+    Raises ConfigurationError, which names the key and the fault.
 
-    folder : folder at which a relative path of a mesh file starts
+    folder : folder to which the path of a mesh file is relative
     mesh : a mapping, as in a scene's file; or a pair of arrays: points (N, 3) m with triangles
         (T, 3) or tetrahedra (E, 4) of indices of points, from 0
     keys : ``effects`` and ``frames`` are required, see config/README.md; ``name`` and ``title``
@@ -115,7 +115,7 @@ def build_scene(folder: str | os.PathLike[str] = ".", mesh: Any = None, **keys: 
 
 
 def bound(config: SceneConfig, folder: Path, source: str) -> Scene:
-    """Scene of ``config``; a mesh file's path is relative to ``folder``; errors name ``source``."""
+    """Build the scene of ``config``, with mesh files in ``folder``; errors name ``source``."""
     try:
         return Scene.build(config, config.mesh.build(folder))
     except PdromError as error:
@@ -134,14 +134,14 @@ def save(run: Run, path: str | os.PathLike[str]) -> None:
 def load(path: str | os.PathLike[str], unchecked: bool = False) -> Run:
     """Read a run from the file ``path`` (HDF5) that `save`, `pdrom.api.run` or the pipeline wrote.
 
-    The file is never changed or renamed. ``unchecked`` accepts one without a checksum, not with a
-    wrong one. StorageError if the file is missing, damaged or without a checksum, has links to
-    other files, or lacks data, finite and of the right shapes, that its scene requires.
+    The file is never changed. ``unchecked`` accepts a file without a checksum, but not a wrong
+    checksum. Raises StorageError if the file is missing, damaged or without a checksum, links to
+    other files, or lacks data of its scene, or if these are not finite or of a wrong shape.
     """
     path = file_path(path)
     with opened(path, "run", unchecked) as file:
         if "positions" not in file or "timings" not in file:
-            raise StorageError(f"{path}: holds no run that could be opened; see pdrom show")
+            raise StorageError(f"{path}: holds no complete run; pdrom show tells its contents")
         found = stored_run(_scene(file, path), file)
         _require_consistent(found)
         return found
@@ -149,9 +149,9 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> Run:
 
 @contextmanager
 def opened(path: Path, what: str, unchecked: bool = False) -> Iterator[h5py.File]:
-    """Open the file ``path`` to read a ``what`` from it; StorageError for any fault of it."""
+    """Open the file ``path`` to read a ``what`` from it; StorageError if the file is invalid."""
     if path.is_file() and not h5py.is_hdf5(path):
-        raise StorageError(f"{path}: holds no {what}: it is no HDF5 file")
+        raise StorageError(f"{path}: holds no {what}: it is not an HDF5 file")
     try:
         with store.open_hdf5(path, unchecked) as file:
             store.require_self_contained(file, path)
@@ -160,20 +160,20 @@ def opened(path: Path, what: str, unchecked: bool = False) -> Iterator[h5py.File
         raise
     except (PdromError, ValueError, TypeError, LookupError, RuntimeError, AttributeError) as error:
         fault = " ".join(str(error).split())[:200]
-        raise StorageError(f"{path}: holds no sound {what} ({fault})") from error
+        raise StorageError(f"{path}: holds no valid {what} ({fault})") from error
 
 
 def _require_consistent(found: Run) -> None:
     found.require_finite("run")
     points = found.scene.mesh.points
     if np.abs(found.positions[0] - points).max() > 1e-6 * np.abs(points).max():
-        raise ValueError("frame 0 of the positions is not the mesh")
+        raise ValueError("positions of frame 0 differ from the mesh")
     if found.ms.min(initial=0.0) < 0.0:
-        raise ValueError("a time is below zero")
+        raise ValueError("a time is negative")
 
 
 def _scene(file: h5py.File, path: Path) -> Scene:
-    """Scene of the run in ``file`` at ``path``, with the stored mesh, else its configured mesh."""
+    """Build the scene of the run in ``file`` at ``path``, with the stored or configured mesh."""
     settings = json.loads(file.attrs["configuration"])
     # the pipeline stores the scene under the key "config", `save` and `run` under "scene"
     keys = settings.get("config") or settings["scene"]
@@ -181,7 +181,7 @@ def _scene(file: h5py.File, path: Path) -> Scene:
     scene = validate(SceneConfig, keys, str(path))
     if "mesh" in file:
         return Scene.build(scene, stored_mesh(file["mesh"]))
-    # a relative path of a mesh starts at the nearest folder above the run's file that has the mesh
+    # a mesh path is relative to the nearest folder above the run's file in which the mesh exists
     mesh, above = scene.mesh, path.resolve().parents
     named = [f for f in above if isinstance(mesh, MeshFile) and (f / mesh.path).is_file()]
     return bound(scene, [*named, Path()][0], str(path))

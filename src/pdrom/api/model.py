@@ -1,4 +1,4 @@
-"""Reduced models: what `pdrom.api.train` returns; they run scenes, and are saved and loaded."""
+"""Reduced models from `pdrom.api.train`, which run scenes and can be saved and loaded."""
 
 import json
 import os
@@ -36,7 +36,7 @@ from pdrom.reduction.timing import Variant, measure
 from pdrom.view.page import LIVE, page_of, require_page, view_of
 
 FORMAT = 1  # version of the file of a model
-BUSY = 1.25  # wall time over processor time from which the processor counts as busy
+BUSY = 1.25  # ratio of wall time to processor time above which other programs count as running
 OnFrame = Callable[[int, FrameReport], None]
 
 
@@ -46,15 +46,15 @@ def silent(frame: int, report: FrameReport) -> None:
 
 @dataclass(frozen=True)
 class Training:
-    """Training of a model: its settings and cost.
+    """Settings and cost of the training of a model.
 
     trajectories : names of the training trajectories
     converged : whether their frames were solved to convergence
     tolerance : sampling tolerance: bound of the relative residual of the training equations; None
         without sampling
-    residual : the residual that was reached, the largest of all groups; None without sampling
+    residual : relative residual of the sampled groups, the largest; None without sampling
     seconds : time of the training, s
-    solver : by which the model runs if nothing else is asked for, see `Model.run`
+    solver : default solver of the model, see `Model.run`
     """
 
     trajectories: tuple[str, ...]
@@ -69,22 +69,22 @@ class Training:
         text = f"trained on {', '.join(self.trajectories)} ({solved}) in {self.seconds:.3g} s"
         if self.tolerance is None or self.residual is None:
             return text
-        missed = f", misses the tolerance {self.tolerance:g}" * (self.residual > self.tolerance)
+        missed = f", violates the tolerance {self.tolerance:g}" * (self.residual > self.tolerance)
         return f"{text}, residual {self.residual:.2g}{missed}"
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A reduced model: runs scenes on the mesh of its training, with the same constraint groups.
+    """Reduced model, which runs scenes with the mesh and the constraint groups of its training.
 
-    scene : the first scene of the training
-    reduced : what is computed: a position subspace with sampled elements, or all vertices with the
-        projections of a group reduced
+    scene : first training scene
+    reduced : model of the unknowns: coordinates of a position subspace, with sampled elements, or
+        all vertices, with reduced projections of one group
     training : how it was trained
     validation : table of trajectories: ``trajectory``, ``position_error``, ``deformation_error``,
-        ``replay_error`` (position error of the first training run, shown instead), ``ms`` per
-        frame, ``speedup`` over the full order, ``busy`` (other programs ran: times mean nothing),
-        ``blowup_frame`` (NaN: none)
+        ``replay_error`` (position error of replaying the first training run), ``ms`` per frame,
+        ``speedup`` over the full-order model, ``busy`` (times are unreliable, since other programs
+        ran), ``blowup_frame`` (NaN: none)
     """
 
     scene: Scene
@@ -99,14 +99,14 @@ class Model:
             position, deformation = worst_errors(self.validation)
             solved = " converged" * self.training.converged
             errors = (
-                f"largest errors against {count}{solved} run{'s' * (count > 1)} of the full order "
+                f"largest errors against {count}{solved} full-order run{'s' * (count > 1)} "
                 f"{position:.2g} (positions), {deformation:.2g} (deformation), "
             )
         return f"Model({self.title}: {self.training}, {errors}{kept.nbytes / 1e6:.2g} MB)"
 
     @property
     def title(self) -> str:
-        """Name of the training scene, modes of the model, and elements that it evaluates."""
+        """Training scene, number of modes and number of evaluated elements, in words."""
         total = sum(group.elements for group in self.scene.groups)
         used = f"{self.reduced.elements_evaluated(self.scene)} of {total} elements"
         return f"a model of '{self.scene.config.name}' ({self.reduced.title}, {used})"
@@ -119,22 +119,22 @@ class Model:
         iterations: int | None = None,
         solver: str | None = None,
     ) -> Run:
-        """Run ``scene``; a run that blows up ends there and is a result like any other.
+        """Simulate ``scene`` with the model; a run that blows up ends early and is returned, too.
 
         scene : scene with the mesh and the constraint groups of the training; weights, masses,
-            forces and the time step may differ; it may hold what a training scene held or declared
+            forces and the time step may differ; it may hold what the training held or declared
         out : file (HDF5) to write; None writes no file
         on_frame : called after each frame with its number, from 0, and the solver's report
-        iterations : of a frame; None: until it has converged (Newton), or those of the scene
-        solver : "newton" or "local_global" (as the full order); None: that of the training
+        iterations : of a frame; None: until convergence (Newton's method), or as in the scene
+        solver : "newton" or "local_global" (as the full-order model); None: `Training.solver`
 
-        Returns positions of all vertices, and milliseconds of each frame, in which they are
-        included. Raises PdromError if the scene has another mesh, other groups or holds, or an
-        effect that the model cannot simulate, or if ``out`` cannot be written.
+        Returns positions of all vertices, and milliseconds of each frame, including their
+        computation. Raises PdromError if the scene has another mesh, other groups, other fixed
+        vertices or an effect that the model cannot simulate, or if ``out`` cannot be written.
         """
         files.require_runnable(scene, out, on_frame)
         loop, start = self.loop(scene, iterations, solver)
-        next(loop.run(start, range(1)))  # loads compiled code, which no frame's time shall include
+        next(loop.run(start, range(1)))  # loads compiled code, outside the times of frames
         run = rerun(scene, loop, start, None, BLOWUP_EXTENT, self._lift(), on_frame)
         asked = f"{iterations} iterations" if iterations else ""
         method = ", ".join(filter(None, (self.title, asked, solver)))
@@ -147,7 +147,7 @@ class Model:
     def loop(
         self, scene: Scene, iterations: int | None = None, solver: str | None = None
     ) -> tuple[Stepper, State]:
-        """Step loop of ``scene`` in the model's unknowns, and the initial state; see `run`."""
+        """Return the step loop of ``scene`` in the model's unknowns and the initial state."""
         require_same_mesh(self.scene, scene)
         asked = validate(_Asked, {"iterations": iterations, "solver": solver}, "model")
         newton = (asked.solver or self.training.solver) == "newton"
@@ -157,20 +157,20 @@ class Model:
             subspaces.require_holds(scene, self.reduced.columns)
             return self.reduced.loop(scene, newton)
         if newton:
-            raise ConfigurationError("model: solver = newton: this model has no position subspace")
+            raise ConfigurationError("model: solver = newton needs a position subspace")
         return self.reduced.loop(scene)
 
     def view(self, path: str | os.PathLike[str], full: Run | None = None) -> None:
-        """Write a page (HTML, one file) in which the model runs, and a reader drags its handles.
+        """Write an HTML page (one file) that runs the model and lets a reader drag its handles.
 
-        It runs the scene of ``full``, a full-order run that is shown as wires, else the training
-        scene. PdromError if the model reduces projections, the page lacks a group or effect of the
-        scene, `run` refuses it, or the page is too large or cannot be written to ``path``.
+        The page simulates the scene of the full-order run ``full``, shown as wires, or else the
+        training scene. PdromError if the model has no position subspace, the page cannot simulate
+        the scene, `run` refuses it, or the page is too large or cannot be written to ``path``.
         """
         require_page(files.output(path))
         own, scene, positions = self.reduced, self.scene, None
         if not isinstance(own, SubspaceModel):
-            raise NotReducibleError(f"{self.title} reduces projections: train without a method")
+            raise NotReducibleError(f"{self.title} runs in no page; train without a method")
         if full is not None:
             scene, positions = files.require_run(full, "full").scene, full.positions
             if not full.full_order:
@@ -183,7 +183,7 @@ class Model:
         store.write_text(page_of(LIVE, [entry]), path, with_checksum=False)
 
     def _lift(self) -> Callable[[np.ndarray], np.ndarray]:
-        """Function that maps the unknowns of `loop` to positions (N, 3) m, for one thread."""
+        """Return the map from unknowns of `loop` to positions (N, 3) m, for one thread."""
         if not isinstance(self.reduced, SubspaceModel):
             return self.reduced.positions
         output = self.reduced.output(float)
@@ -192,17 +192,17 @@ class Model:
     def start(
         self, scene: Scene, iterations: int | None = None, solver: str | None = None
     ) -> "Loop":
-        """Start ``scene`` frame by frame; ``iterations`` and ``solver`` are those of `run`."""
-        files.require(Scene, scene, "scene", source="build_scene and load_scene make one")
+        """Begin a run of ``scene`` frame by frame; ``iterations`` and ``solver`` as in `run`."""
+        files.require(Scene, scene, "scene", source="made by build_scene or load_scene")
         if not isinstance(self.reduced, SubspaceModel):
             raise ConfigurationError("start: this model has no position subspace; use run")
         return Loop(scene, *self.loop(scene, iterations, solver), self._lift())
 
     def speed(self, scene: Scene, repeats: int = 3) -> dict[str, Any]:
-        """Measure the model and the full order in turn, in this process, on ``scene``.
+        """Time the model and the full-order model in turn on ``scene``, in this process.
 
-        Return ``ms`` and ``full_ms`` per frame, of all frames, each of its median repeat, their
-        ratio ``speedup``, and ``busy``, whether other programs took the processor meanwhile.
+        Return ``ms`` and ``full_ms`` per frame (means over all frames, each of its median repeat),
+        their ratio ``speedup``, and ``busy``, whether other programs used the processor.
         """
         files.require_runnable(scene, None, silent)
         frames, lift = scene.config.frames, self._lift()
@@ -237,7 +237,7 @@ class Model:
 
 
 class _Asked(ConfigModel):
-    """Arguments of `Model.run` and `Loop.move`; each call sets its own ones."""
+    """Arguments of `Model.run` and `Loop.move`, with default values for validation."""
 
     iterations: Annotated[int, Field(ge=1, le=10_000)] | None = None
     solver: Literal["newton", "local_global"] | None = None
@@ -246,9 +246,9 @@ class _Asked(ConfigModel):
 
 
 class Loop:
-    """A scene, computed frame by frame; ``frame`` is the number of the next one, from 0.
+    """Run of a scene, computed frame by frame; ``frame`` is the next frame's number, from 0.
 
-    It may go on beyond the scene's frames, and does not end if it blows up.
+    The run can continue beyond the scene's frames, and does not end if it blows up.
     """
 
     def __init__(
@@ -268,10 +268,10 @@ class Loop:
         self.frame += 1
 
     def move(self, hold: Any, displacement: Sequence[float]) -> None:
-        """Displace a hold by ``displacement`` m; displacements add up.
+        """Move fixed vertices by ``displacement`` m; displacements of all calls add up.
 
-        ``hold`` is the name of its effect ("pins"), or the selection of its vertices ("left").
-        ConfigurationError unless this is one hold of the next frame.
+        ``hold`` is the name of the effect that fixes them ("pins"), or their selection ("left").
+        ConfigurationError unless it names exactly one hold of the next frame.
         """
         moves = {"displacement": np.asarray(displacement, dtype=object).tolist()}
         shift = np.array(validate(_Asked, moves, "move").displacement)
@@ -285,7 +285,7 @@ class Loop:
             found = [b for b in active if np.array_equal(b.vertices, self._selected[key])]
         if len(found) != 1:
             known = (f"{b.boundary.name} of {b.boundary.side or len(b.vertices)}" for b in active)
-            fault = f"{len(found)} holds of frame {self.frame}; there are: {', '.join(known)}"
+            fault = f"names {len(found)} holds of frame {self.frame}, not 1 of: {', '.join(known)}"
             raise ConfigurationError(f"move: {shown(hold, 60)}: {fault}")
         found[0].shift = found[0].shift + shift
 
@@ -313,14 +313,14 @@ def require_same_mesh(own: Scene, other: Scene) -> None:
 
 
 def worst_errors(validation: pd.DataFrame) -> list[float]:
-    """Largest errors of positions and of deformation; inf if one of the runs blew up."""
+    """Return the largest position and deformation error; inf if one of the runs blew up."""
     if validation.blowup_frame.notna().any():
         return [np.inf, np.inf]
     return [float(validation[f"{kind}_error"].max()) for kind in ("position", "deformation")]
 
 
 def timed(variants: Sequence[Variant], repeats: int) -> tuple[list[float], bool]:
-    """Milliseconds per frame of each of ``variants``, and whether other programs ran meanwhile."""
+    """Return milliseconds per frame of each of ``variants``, and whether other programs ran."""
     wall, used = perf_counter(), process_time()
     spent = [row["ms_per_frame"] for row in measure(variants, 1, repeats)]
     return spent, perf_counter() - wall > BUSY * (process_time() - used)
@@ -332,7 +332,7 @@ def _put(file: h5py.Group, name: str, values: Any, unit: str) -> None:
 
 
 def _export(scene: Scene, model: SubspaceModel, file: h5py.Group) -> None:
-    """Write what a frame of the training scene needs, for programs without pdrom, to ``file``."""
+    """Write the data for a frame of the training scene to ``file``, for other programs."""
     steps = {}
     for group in scene.groups:
         chosen = model.chosen(group)
@@ -358,16 +358,16 @@ def _export(scene: Scene, model: SubspaceModel, file: h5py.Group) -> None:
 
 
 def load_model(path: str | os.PathLike[str]) -> Model:
-    """Read a model from the file ``path`` that `Model.save` wrote; it runs with the same bits.
+    """Read a model from the file ``path`` that `Model.save` wrote; its runs are equal bit for bit.
 
-    StorageError if the file is missing, damaged or edited, holds no model, or is of a newer pdrom.
+    StorageError if the file is missing, damaged or edited, has no model, or is from a newer pdrom.
     """
     path = files.file_path(path)
     with files.opened(path, "model") as file:
         if "model" not in file or "format" not in file.attrs:
-            raise StorageError(f"{path}: holds no model (pdrom show says what it holds)")
+            raise StorageError(f"{path}: holds no model; pdrom show tells its contents")
         if (version := int(file.attrs["format"])) > FORMAT:
-            raise StorageError(f"{path}: format {version} of a newer pdrom (allowed: to {FORMAT})")
+            raise StorageError(f"{path}: format {version} needs a newer pdrom (known: {FORMAT})")
         return _model(file, json.loads(file.attrs["configuration"])["scene"], str(path))
 
 

@@ -21,13 +21,13 @@ COUNT = r"(^|, )(converged|\d+ iterations?(, Anderson)?)( on )?"
 def plot(reference: Run, *runs: Run) -> Figure:
     """Plot errors of runs against time; a cross marks the end of a run that blew up.
 
-    Each of ``runs`` gets a line: its relative error against ``reference``, such as the full-order
-    run of their scene, in every frame over seconds. Errors below 1e-7 or above 1e3 are drawn on
-    these limits. ``plot(...).savefig("errors.png")`` writes the picture. ConfigurationError or
-    SceneError if an argument is no run, or does not compare with ``reference``; without ``runs``.
+    Each of ``runs`` gets a line: its relative position error against ``reference``, such as the
+    full-order run of the scene, in every frame. Errors below 1e-7 or above 1e3 are drawn at these
+    limits. ``plot(...).savefig("errors.png")`` writes the picture. ConfigurationError or SceneError
+    if no ``runs`` are given, or an argument is no run or not comparable with ``reference``.
     """
     if not runs:
-        raise SceneError("plot: at least one run beside the reference is required")
+        raise SceneError("plot: at least one run and its reference are required")
     for run in (reference, *runs):
         require_run(run, "plot")
         run.require_comparable(reference)
@@ -45,7 +45,7 @@ def plot(reference: Run, *runs: Run) -> Figure:
                 ax.plot(time[-1:], error[-1:], color=colour, marker="x", markersize=5)
         ax.set_xlim(0.0, None)
         ax.set_xlabel("time in s")
-        ax.set_ylabel("error of the positions")
+        ax.set_ylabel("relative position error")
         ax.legend(loc="upper left")
     return figure
 
@@ -53,7 +53,7 @@ def plot(reference: Run, *runs: Run) -> Figure:
 def plot_cost(table: pd.DataFrame) -> Figure:
     """Plot error against time of a ``table`` by `pdrom.api.cost`; a line joins the best settings.
 
-    A dashed line is the error of the mesh. Settings that blew up or have no error are left out.
+    A dashed line shows the error due to the mesh. Settings without a finite error are left out.
     """
     table = table[np.isfinite(table.position_error)]
     places = table.setting.str.replace(COUNT, "", regex=True).map(style.plain_words)
@@ -64,7 +64,7 @@ def plot_cost(table: pd.DataFrame) -> Figure:
         best, mesh = table[table.best], table.attrs["mesh_error"]
         ax.plot(best.ms, best.error, color=style.GREY, zorder=1, label="best settings")
         for i, (place, own) in enumerate(table.groupby("place")):
-            label = place or "scene's own mesh"
+            label = place or "the scene's mesh"
             ax.scatter(own.ms, own.error, color=style.CYCLE[i % len(style.CYCLE)], label=label)
         for row in table.itertuples():
             text = f"{row.iterations}{' A' * ('Anderson' in row.setting)}".replace("<NA>", "N")
@@ -78,26 +78,26 @@ def plot_cost(table: pd.DataFrame) -> Figure:
 
 
 def view(path: str | os.PathLike[str], *runs: Run) -> None:
-    """Write a page (HTML, one file) that shows runs; a browser opens it without a network.
+    """Write an HTML page (one file) that shows runs and opens without a network.
 
-    Full-order and reduced ``runs`` with equal scenes are shown together, compared with the
-    full-order run among them. If ``path`` ends in .png, it gets a picture of four frames of each
-    run, which are of one scene. PdromError if an argument is no run, no run is given, two different
-    scenes have one name, or the page would be too large or cannot be written.
+    Runs of equal scenes are shown together and compared with the full-order run among them. If
+    ``path`` ends in .png, a picture with four frames of each run is written, for runs of one scene.
+    PdromError if no run is given, an argument is no run, two different scenes have the same name,
+    or the page would be too large or cannot be written.
     """
     path, scenes = output(path), viewed_scenes(*runs)
     if path.suffix.lower() != ".png":
         write_page(scenes, path)
         return
     if len(scenes) > 1:
-        raise SceneError(f"{path}: runs of {len(scenes)} scenes, a picture has one")
+        raise SceneError(f"{path}: a picture shows 1 scene, given: {len(scenes)}")
     write_frames(scenes[0], path)
 
 
 def viewed_scenes(*runs: Run) -> list[ViewedScene]:
     """Collect ``runs`` of any kind by scene, for pictures and pages.
 
-    They are compared with the first full-order run of their scene, or else its first run.
+    Runs are compared with the first full-order run of their scene, or else its first run.
     ConfigurationError if an argument is no run, SceneError without arguments or if two different
     scenes have one name.
     """

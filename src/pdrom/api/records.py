@@ -1,4 +1,4 @@
-"""The run of a scene, in full order or with a model, its errors, and its arrays in a file."""
+"""Full-order and reduced runs, their errors, and their arrays in a file."""
 
 from dataclasses import dataclass, field, is_dataclass
 from functools import cache, reduce
@@ -20,7 +20,7 @@ from pdrom.reduction.rerun import displacement_norms, mean_motion
 
 
 def require_types(record: Any) -> None:
-    """Raise ConfigurationError if a field of the dataclass ``record`` has not its declared type."""
+    """Raise ConfigurationError if a field of the dataclass ``record`` lacks its declared type."""
     kind: Any = type(record)
     validate(_strict(kind), vars(record), kind.__name__)
 
@@ -38,7 +38,7 @@ class Snapshots:
     """n training snapshots of a group of e elements with p rows.
 
     p : (n, e p, 3) projections in the last local step of the ``frames`` (n,)
-    roundoff : (n,) norm of the round-off in p
+    roundoff : (n,) norm of the rounding errors of p
     """
 
     p: np.ndarray
@@ -52,15 +52,15 @@ class Snapshots:
 
 
 FULL = "full order"
-STILL = 1e-6  # a body stands still if no coordinate changes by more than this part of its extent
+STILL = 1e-6  # nothing moves if no coordinate changes by more than this fraction of the extent
 
 
 @dataclass(frozen=True)
 class Errors:
     """Errors of a run against the run that ``reference`` names.
 
-    position : of the positions, relative to the reference's displacements; None if it stands still
-    deformation : of the shapes, see `pdrom.model.metrics.deformation_error`; None of a rigid body
+    position : position error, relative to displacements of the reference; None if nothing moves
+    deformation : see `pdrom.model.metrics.deformation_error`; None for a rigid body
     """
 
     position: float | None
@@ -75,14 +75,14 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run of a scene, in full order or with a model.
+    """Run of a scene with the full-order model or a reduced model.
 
-    positions : (F' + 1, N, 3) m; entry 0 is the initial state; F' < F frames of a run that blew up
+    positions : (F' + 1, N, 3) m; entry 0 is the initial state; F' < F if the run blew up
     ms : (F',) milliseconds of each frame, with the positions of all vertices
-    snapshots : name of each constraint group -> its training snapshots; empty of a reduced run
-    method : what computed the run: `FULL`, or the title of a model
-    blowup_frame : first frame that blew up; None of a run that did not
-    frame_error : (F,) estimated error of each frame, NaN where it has none; None without estimates
+    snapshots : name of each constraint group -> its training snapshots; empty for a reduced run
+    method : `FULL`, or the title of the model that computed the run
+    blowup_frame : first frame that blew up; None if no frame did
+    frame_error : (F,) estimated error of each frame, NaN if not estimated; None without estimates
     """
 
     scene: Scene
@@ -125,12 +125,12 @@ class Run:
 
     @property
     def full_order(self) -> bool:
-        """Whether the run is one of the full order, and no model's."""
+        """Whether the full-order model computed the run."""
         return self.method.startswith(FULL)
 
     @property
     def title(self) -> str:
-        """Description of the run by which messages name it as a reference."""
+        """Description of the run in messages and of references."""
         config, asked = self.scene.config, self.scene.config.iterations
         title = f"the run of '{config.name}' by {self.method}"
         if self.method != FULL:
@@ -148,10 +148,10 @@ class Run:
             require_finite(f"{name}: {array}", values, SnapshotError)
 
     def error(self, reference: "Run") -> Errors:
-        """Errors of the positions and of the deformation against ``reference``, over all frames.
+        """Compute position and deformation error against ``reference``, over all frames.
 
-        Both are None if one of the runs blew up. ConfigurationError if ``reference`` has another
-        mesh, time step or number of frames.
+        Both errors are None if one of the runs blew up. ConfigurationError if ``reference`` has
+        another mesh, time step or number of frames.
         """
         self.require_comparable(reference)
         if self.blowup_frame is not None or reference.blowup_frame is not None:
@@ -165,17 +165,17 @@ class Run:
         return Errors(trajectory_error(distance, moved_by), shape, reference.title)
 
     def errors(self, reference: "Run") -> np.ndarray:
-        """Error (F',) of the positions, relative to the RMS displacement; NaN if nothing moves."""
+        """Compute position errors (F',), relative to the RMS displacement; NaN if nothing moves."""
         still = standstill(reference.scene, reference.positions)
         return self.differences(reference) / (np.nan if still else mean_motion(reference.positions))
 
     def differences(self, reference: "Run") -> np.ndarray:
-        """Frobenius norm (F',) m of the difference from ``reference`` in each frame of this run."""
+        """Compute norms (F',) m of the position differences from ``reference`` in each frame."""
         other = reference.positions[1 : len(self.positions)]
         return np.linalg.norm(self.positions[1:] - other, axis=(1, 2))
 
     def require_comparable(self, reference: Any) -> None:
-        """Raise ConfigurationError unless ``reference`` is a run with which this one compares."""
+        """Raise ConfigurationError unless ``reference`` is a run comparable with this run."""
         if not isinstance(reference, Run):
             raise ConfigurationError(f"reference = {shown(reference, 60)}: a Run is required")
         own, other = self.scene, reference.scene
@@ -190,9 +190,9 @@ class Run:
 
 
 def standstill(scene: Scene, positions: np.ndarray) -> str:
-    """Say how little the ``positions`` (F + 1, N, 3) m of a run of ``scene`` change; "" if they do.
+    """Return a message if ``positions`` (F + 1, N, 3) m of a run of ``scene`` hardly change, or "".
 
-    Vertices that are held in every frame do not count: nobody computes their positions.
+    Vertices that are held in every frame do not count, as their positions are prescribed.
     """
     held = (held_vertices(scene.boundaries, frame) for frame in range(len(positions) - 1))
     every = np.arange(scene.mesh.vertices)
@@ -208,7 +208,7 @@ _SNAPSHOTS = ("p", "roundoff", "frames")
 
 
 def stored_run(scene: Scene, file: h5py.File) -> Run:
-    """Run of ``scene`` from the open HDF5 ``file``."""
+    """Read the run of ``scene`` from the open HDF5 ``file``."""
     stored, ended = file.get("snapshots", {}), int(file.attrs.get("blowup_frame", -1))
     return Run(
         scene, file["positions"][...], file["timings"][...].sum(axis=1),

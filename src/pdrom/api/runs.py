@@ -1,4 +1,4 @@
-"""Full-order and reduced runs."""
+"""Full-order runs, bases of projections, and models that reduce projections."""
 
 import logging
 import os
@@ -37,7 +37,7 @@ SNAPSHOTS = 100  # largest number of training snapshots of a group if the scene 
 
 
 class _Compilation(event.TimingListener):  # type: ignore[misc]
-    """Measure how long a run ``name`` compiles kernels; log when this begins."""
+    """Measure how long a run ``name`` compiles kernels; log when compilation begins."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -58,23 +58,23 @@ def run(
     frame: int | None = None,
     estimate: bool = True,
 ) -> Run:
-    """Run a scene in full order; snapshots of every group are stored for the training of a basis.
+    """Simulate a scene with the full-order model; store snapshots of every group for training.
 
-    Log a warning where held vertices or free vertices at rest lie inside an obstacle, or if frames
-    are not converged, and (level INFO) the compilation of kernels, for which a first run waits.
+    Log a warning if held vertices, or free vertices at rest, lie inside an obstacle, or if frames
+    are not converged. Log (level INFO) the compilation of kernels, for which a first run waits.
 
     scene : scene made by `build_scene` or `load_scene`
     out : file (HDF5) to write; None writes no file
     on_frame : called after each frame with its number, from 0, and the solver's report
-    start : run on the same mesh, with the same time step, that goes on in ``scene``
-    frame : number of frames of ``start`` that are kept (None: all). Frame numbers, also those of
-        holds, count on; pins that ``start`` has not begin there, and handles at their ``start``
+    start : run with the same mesh and time step that ``scene`` continues
+    frame : number of frames of ``start`` that are kept (None: all). Frame numbers continue, also
+        those of holds; pins that ``start`` lacks begin there, and handles at their key ``start``
     estimate : estimate the error of every 20th frame, see `pdrom.model.dynamics.convergence`
 
-    Returns positions and milliseconds of every frame, and snapshots of every group, not of kept
-    frames. If ``start`` ran with other settings, ``method`` says so. Raises PdromError, before the
-    run, if an argument is wrong: ``start`` does not suit ``scene`` or has no such frame, a handle
-    or initial velocity of ``scene`` would begin before it, or ``out`` cannot be written.
+    Returns positions and milliseconds of every frame, and snapshots of every group in new frames.
+    If ``start`` ran with other settings, ``method`` says so. Raises PdromError, before the run, if
+    an argument is invalid: ``start`` does not fit ``scene`` or has too few frames, a handle or
+    initial velocity of ``scene`` would begin before ``frame``, or ``out`` cannot be written.
     """
     files.require_runnable(scene, out, on_frame)
     begun, method = _begun(scene, start, frame)
@@ -109,7 +109,7 @@ def _begun(
     """Return states and reports of the frames of ``start`` that are kept, and the new method."""
     if start is None:
         if frame is not None:
-            raise ConfigurationError("--frame: only with --from, the run that goes on (start)")
+            raise ConfigurationError("--frame: only with --from, the run to continue (start)")
         return [], None
     own, h = files.require_run(start, "start").scene, scene.config.time_step
     for key in ("points", "triangles", "tetrahedra", "time_step"):
@@ -132,12 +132,12 @@ def _begun(
     for each, hold in zip(has, scene.boundaries, strict=True):
         kept.append(anchors[had.index(each)] if hold.moves and each in had else None)
         if hold.moves and kept[-1] is None and hold.active(n) and not hold.takes_hold(n):
-            fault = f"effect '{hold.name}' begins before frame {n}, where start does not move it"
-            raise ConfigurationError(f"{fault}: it would jump; start: {n} begins it there")
+            fault = f"effect '{hold.name}' begins before frame {n}, but start lacks it"
+            raise ConfigurationError(f"{fault}: its vertices would jump; set start: {n}")
     for first in scene.starts:
         if first.config not in [each.config for each in own.starts]:
-            fault = f"effect '{first.name}' acts at frame 0 only, where start has none like it"
-            raise ConfigurationError(f"{fault}: leave it out of a scene that goes on")
+            fault = f"effect '{first.name}' acts at frame 0 only, but start lacks it"
+            raise ConfigurationError(f"{fault}: remove it from a scene that continues start")
     anchors, unknown, part = tuple(kept), np.full(1, np.nan), 1e-3 / len(PHASES)  # of each phase
     begun = [
         (State(after, (after - before) / h, anchors), FrameReport(unknown, np.full(4, part * ms)))
@@ -153,22 +153,22 @@ def _warn_unless_converged(scene: Scene, loop: Stepper) -> None:
         limit, after = asked.error, f" after {asked.most} iterations (most)"
     if worst and worst[0] > limit:
         log.warning(
-            "%s: frames are not converged%s: the estimated error of frame %d is %.2g of its motion "
-            "(allowed %g); tried on it: %s; --check estimates the error of the run",
+            "%s: frames are not converged%s: the error of frame %d is %.2g of its displacement "
+            "(estimate; allowed: %g); tried on it: %s; --check estimates the error of the run",
             scene.config.name, after, worst[1], worst[0], limit,
             remedy(scene, worst[2], worst[1], limit),
         )  # fmt: skip
 
 
 def check(full: Run) -> Errors:
-    """Estimate the error of a run from a second one with twice the iterations, accelerated.
+    """Estimate the error of a run by a second run with twice the iterations, accelerated.
 
-    It is too small if that run is far from converged, too. SnapshotError if that run blows up.
+    It is too small if the second run is far from converged. SnapshotError if that run blows up.
     """
     scene = files.require_run(full, "full").scene
     if full.method != FULL:
         raise ConfigurationError(f"{full.title}: a full-order run is required")
-    more, title = scene.config.iterations, "a tenth of its frame errors"
+    more, title = scene.config.iterations, "frame errors ten times smaller"
     if isinstance(more, Until):
         more = more.model_copy(update={"error": more.error / 10, "most": 2 * more.most})
     else:
@@ -182,10 +182,10 @@ def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:
     """Compute the POD basis of the projections of a constraint ``group`` of the run ``full``.
 
     ``method``, a name in config/methods.yaml or a specification, sets how the snapshots are centred
-    and weighted, and whether the axes x, y, z have coefficients in common.
+    and weighted, and whether the axes x, y, z share coefficients.
 
     Returns modes ``V`` (3 e p, rank), ``mean`` (3 e p,), all ``singular_values``, ``rank`` (number
-    of modes above round-off). A vector has e elements one after another, p rows (x, y, z) each.
+    of modes above rounding errors). A vector has e elements in turn, of p rows (x, y, z) each.
     Raises PdromError if ``full`` is no run, the method or group is unknown, or snapshots are too
     few or not finite.
     """
@@ -194,7 +194,7 @@ def basis(full: Run, group: str, method: str | MethodSpec = "pod") -> Basis:
     chosen = full.scene.group(group)
     spec = method_spec(method)
     if group not in full.snapshots:
-        raise SnapshotError(f"group '{group}': the run stored no snapshots of it")
+        raise SnapshotError(f"group '{group}': the run has no snapshots of this group")
     data = full.snapshots[group]
     roundoff = float(np.linalg.norm(data.roundoff))
     made = group_basis(chosen, full.scene.masses, data.p, roundoff, spec)
@@ -209,10 +209,10 @@ def methods() -> dict[str, MethodSpec]:
 def projections_model(
     full: Run, group: str | None, method: str | MethodSpec, r: int
 ) -> ProjectionModel:
-    """Model in which the projections of ``group`` are reduced to r modes by ``method``.
+    """Build a model in which ``method`` reduces the projections of ``group`` to r modes.
 
     ``group`` None is the scene's only group. Raises the errors of `basis`, and RankError if the
-    snapshots do not change, or have fewer than r modes above round-off.
+    snapshots do not change, or have fewer than r modes above rounding errors.
     """
     chosen, spec = group_of(full.scene, group), method_spec(method)
     if still := standstill(full.scene, full.positions):
@@ -225,15 +225,15 @@ def projections_model(
 
 
 def group_of(scene: Scene, name: str | None) -> ConstraintGroup:
-    """Group of this name, for None the only one; ConfigurationError if there are several."""
+    """Return the group ``name``, or for None the only group; ConfigurationError if several."""
     groups = scene.config.groups
     if name is None and len(groups) > 1:
-        raise ConfigurationError(f"group: one of {', '.join(groups)} is required")
+        raise ConfigurationError(f"group: several exist; one of {', '.join(groups)} is required")
     return scene.group(name or groups[0])
 
 
 def method_spec(method: str | MethodSpec) -> MethodSpec:
-    """Return the method of this name in config/methods.yaml, or a specification, validated."""
+    """Return the method of a name in config/methods.yaml, or a specification, validated."""
     if isinstance(method, MethodSpec):
         return validate(MethodSpec, dict(method), "method")
     known = methods()

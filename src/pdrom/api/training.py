@@ -30,13 +30,13 @@ from pdrom.reduction.subspace.training import make_columns, sampled_models
 
 log = logging.getLogger(__name__)
 
-EVALUATIONS = 20_000  # largest number of a frame that is solved to convergence
-ROUNDOFF = 1e-13  # of positions, as part of the mesh
-METHOD = "gappy"  # by which the projections of a group are reduced if none is named
+EVALUATIONS = 20_000  # largest number of evaluations for a converged frame
+ROUNDOFF = 1e-13  # of positions, relative to the mesh's extent
+METHOD = "gappy"  # default method that reduces the projections of a group
 SIZES = (20, 40, 80)  # numbers of modes that are tried for a required error
 VALIDATION = 1_000_000  # first seed of the validation trajectories
 Progress = Callable[[str, int], OnFrame]
-"""Function of the name of a step and its number of frames that returns what each frame calls."""
+"""Function of a step's name and number of frames; it returns the function each frame calls."""
 
 Count = Annotated[int, Field(ge=0, le=10_000)]
 Bound = Annotated[float, Field(gt=0.0, lt=1.0)]
@@ -58,9 +58,9 @@ class Arguments(ConfigModel):
 
 
 def arguments(scene: Scene, given: Mapping[str, Any]) -> Arguments:
-    """Check arguments ``given`` to `train` by name, as far as possible before a run of ``scene``.
+    """Check the arguments ``given`` to `train`, by name, before any run of ``scene``.
 
-    Raises the errors of `train`; an argument that another one makes meaningless is one of them.
+    Raises the errors of `train`, also for an argument that has no effect because of another one.
     """
     names = keys_of(Arguments)
     plain = {key: v.item() if isinstance(v := given[key], np.generic) else v for key in names}
@@ -75,17 +75,17 @@ def arguments(scene: Scene, given: Mapping[str, Any]) -> Arguments:
         "with group or method": (local, changed - {"group", "r", "validate"}),
         "without group or method": (not local, changed & {"r"}),
         "with error, which tries 20, 40 and 80 modes": (bool(asked.error), changed & {"modes"}),
-        "with an own basis": (basis is not None, changed & {"modes", "error"}),
+        "with basis": (basis is not None, changed & {"modes", "error"}),
         "with tolerance None": (asked.tolerance is None, changed & {"selection"}),
     }
     for what, (applies, wrong) in apart.items():
         if applies and wrong:
             raise ConfigurationError(f"train: {', '.join(sorted(wrong))}: no effect {what}")
     if asked.error is not None and not asked.validate_:
-        raise ConfigurationError("train: error: at least one trajectory to validate is needed")
+        raise ConfigurationError("train: error: a validation trajectory is required (validate)")
     for name in ("selection", "progress"):
         if (function := given.get(name)) is not None and not callable(function):
-            raise ConfigurationError(f"train: {name} = {shown(function, 60)}: no function")
+            raise ConfigurationError(f"train: {name} = {shown(function, 60)}: not a function")
     if local:
         group_of(scene, asked.group)
         method_spec(method or METHOD)
@@ -121,26 +121,26 @@ def train(
     modes : number of POD modes of the displacements
     tolerance : bound of the relative residual of the training equations with sampled elements; None
         keeps all elements
-    skinning : number of skinning columns beside the modes
-    basis : own columns (N, K) instead of modes; affine columns are added, dependent ones dropped
-    selection : own function of equations G (m, elements), sums b (m,) and tolerance that returns
-        indices and factors x >= 0 with G x near b, instead of non-negative least squares
-    hold : sides or other selections of vertices that later scenes may hold, beside those that the
-        training scenes hold
-    variations : number of random variations of the first scene that are trained on, too
-    validate : number of others on which the model is validated
+    skinning : number of skinning columns in addition to the modes
+    basis : columns (N, K) instead of modes; affine columns are added, dependent columns dropped
+    selection : function in place of non-negative least squares: of equations G (m, elements), sums
+        b (m,) and tolerance, it returns indices and factors x >= 0 with G x near b
+    hold : sides or other selections of vertices that later scenes may hold, in addition to those
+        of the training scenes
+    variations : number of random variations of the first scene for training
+    validate : number of other random variations for validation
     converged : solve the training scenes again until every frame has converged
     error : return the smallest of the models of 20, 40 and 80 modes whose errors of positions and
         deformation are at most this on all validation trajectories (``validate`` of at least 1)
-    group : reduce the projections of this constraint group instead; needed if there are several
-    method : name in config/methods.yaml, or a specification, of how they are reduced
-    r : number of their modes
+    group : reduce the projections of this constraint group instead of all positions
+    method : name in config/methods.yaml, or a specification, of the method that reduces them
+    r : number of modes of these projections
     progress : called with name and number of frames of each long step; returns a function that is
         called after each of its frames
 
-    Raises PdromError for a wrong argument, runs of different meshes, too few modes or snapshots;
-    NotReducibleError if no tried model is within ``error``, or a training scene has an effect that
-    no position subspace can simulate or does not move; SolverError if it does not converge.
+    Raises PdromError for an invalid argument, runs of different meshes, too few modes or snapshots;
+    NotReducibleError if no model stays within ``error``, or a training scene does not move or has
+    an effect that no position subspace can simulate; SolverError if it does not converge.
     """
     started = perf_counter()
     given, runs = locals(), [_full_order(one) for one in (full, *others)]
@@ -180,11 +180,11 @@ def train(
 
 
 def _full_order(run: Any) -> Run:
-    """Return ``run``, if it is a run in full order that did not blow up."""
+    """Return ``run`` if it is a full-order run that did not blow up."""
     files.require_run(run, "full")
     if not run.full_order or run.blowup_frame is not None:
         ended = "" if run.blowup_frame is None else f", which blew up in frame {run.blowup_frame}"
-        raise ConfigurationError(f"full: {run.title}{ended}: a run in full order is required")
+        raise ConfigurationError(f"full: {run.title}{ended}: a complete full-order run is required")
     return run
 
 
@@ -192,9 +192,9 @@ def _trained(
     references: Sequence[Run], asked: Arguments, modes: int, hold: Sequence[np.ndarray],
     own: np.ndarray | None, selection: Choose | None, before: float,
 ) -> Model:  # fmt: skip
-    """Model of this number of ``modes``, or with ``own`` columns (N, K), without validation.
+    """Train a model with ``modes`` modes, or ``own`` columns (N, K), without validation.
 
-    ``before`` are seconds that the training has taken already.
+    ``before`` is the time of training so far, s.
     """
     if all(still := [standstill(run.scene, run.positions) for run in references]):
         raise NotReducibleError(f"scene '{references[0].scene.config.name}': {still[0]}")
@@ -203,7 +203,7 @@ def _trained(
     columns = make_columns(scenes, frames, modes, asked.skinning, own, hold)
     reduced, count = SubspaceModel(columns), modes + asked.skinning
     if own is None and columns.modes < count:
-        log.warning("%d modes are asked for, %d exist", count, columns.modes)
+        log.warning("%d modes are requested, but only %d exist", count, columns.modes)
     if asked.tolerance is not None:
         log.info("%d columns: selecting elements", columns.B.shape[1])
         longest = max(scene.config.frames for scene in scenes)
@@ -219,7 +219,7 @@ def _trained(
 
 
 def _own_columns(scene: Scene, basis: Any) -> np.ndarray | None:
-    """Own columns (N, K) as an array of floats, None without; SnapshotError if not finite."""
+    """Return ``basis`` (N, K) as finite floats, scaled to 1, or None; SnapshotError if invalid."""
     if basis is None:
         return None
     try:
@@ -235,7 +235,7 @@ def _own_columns(scene: Scene, basis: Any) -> np.ndarray | None:
 
 
 def _variations(scene: Scene, kind: str, count: int, seed: int) -> list[Scene]:
-    """Variations of ``scene`` by ``count`` seeds from ``seed`` on; their names say the ``kind``."""
+    """Build ``count`` variations of ``scene`` with seeds from ``seed`` on, named by ``kind``."""
     names = [f"{scene.config.name}_{kind}_{n + 1}" for n in range(count)]
     drawn = [scene.config.training_variant(seed + n) for n in range(count)]
     configs = [c.model_copy(update={"name": name}) for c, name in zip(drawn, names, strict=True)]
@@ -243,7 +243,7 @@ def _variations(scene: Scene, kind: str, count: int, seed: int) -> list[Scene]:
 
 
 def tolerance_of(scene: Scene) -> float:
-    """Tolerance of a converged frame: part of the mesh that one more iteration may move."""
+    """Return the step, relative to the mesh's extent, below which a frame is converged."""
     own = UNNOTICED * scene.config.time_step**2 / scene.mesh.extent
     return min(CONVERGED, max(own, ROUNDOFF))
 
@@ -255,7 +255,7 @@ def _reference(scene: Scene, converged: bool, progress: Progress) -> Run:
 
 
 def converged_reference(scene: Scene, progress: Progress) -> Run:
-    """Run ``scene`` in full order with converged frames; SolverError if one does not converge."""
+    """Simulate ``scene`` with converged full-order frames; SolverError if one does not converge."""
     name, frames = scene.config.name, scene.config.frames
     started = perf_counter()
     log.info("%s: solving every frame to convergence", name)
@@ -263,8 +263,8 @@ def converged_reference(scene: Scene, progress: Progress) -> Run:
     found = converged_run(scene, tolerance_of(scene), EVALUATIONS, tick)
     if found is None:
         raise SolverError(
-            f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations; a smaller "
-            "time_step or smaller weights help; converged=False (--unconverged) trains without"
+            f"scene '{name}': a frame does not converge in {EVALUATIONS} evaluations; use a "
+            "smaller time_step or weights, or converged=False (--unconverged) to train without"
         )
     ms = np.full(frames, 1e3 * (perf_counter() - started) / frames)
     log.info("%s: converged in %.1f s", name, 1e-3 * ms.sum())
@@ -274,7 +274,7 @@ def converged_reference(scene: Scene, progress: Progress) -> Run:
 def _validated(model: Model, training: Sequence[Run], tests: Sequence[Run]) -> Model:
     rows = []
     for reference in (*training, *tests):
-        log.info("%s: comparing the model with the full order", reference.scene.config.name)
+        log.info("%s: comparing with the full-order model", reference.scene.config.name)
         made = model.run(reference.scene)
         errors = made.error(reference)
         steps = reference.scene.config.time_step / training[0].scene.config.time_step

@@ -86,7 +86,7 @@ def test_files_are_read_back(full, reduced, tmp_path):
         assert read.scene.config == full.scene.config
         for name, own in run.snapshots.items():
             assert np.array_equal(read.snapshots[name].p, own.p)
-    with pytest.raises(PdromError, match="stored no snapshots"):
+    with pytest.raises(PdromError, match="has no snapshots"):
         api.basis(read, "spring")
     seen: list[int] = []
     stored = api.run(full.scene, tmp_path / "full.h5", lambda frame, report: seen.append(frame))
@@ -123,7 +123,7 @@ FAULTY = {
     "no effects": (lambda *_: api.build_scene(**KEYS), "key 'effects' is missing"),
     "method misspelt": (lambda full, _: spring(full, "gapy"), "did you mean 'gappy'"),
     "group not there": (lambda full, _: api.train(full, group="strain"), "no group 'strain'"),
-    "no snapshots": (lambda full, _: spring(replace(full, snapshots={})), "stored no snapshots"),
+    "no snapshots": (lambda full, _: spring(replace(full, snapshots={})), "has no snapshots"),
     "mesh not there": (lambda _, p: given({"kind": "file", "path": "x.obj"}, folder=p), r"x\.obj"),
     "positions cut": (lambda full, _: replace(full, positions=full.positions[:-1]), "positions of"),
     "r zero": (lambda full, _: spring(full, r=0), "train: r = 0"),

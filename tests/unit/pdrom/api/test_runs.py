@@ -52,7 +52,7 @@ def test_another_scene_goes_on_from_a_run_and_says_so(tmp_path):
     again = api.run(own, tmp_path / "a.h5", start=found, frame=9)  # pins do not return to rest
     assert np.array_equal(again.positions, found.positions)
     assert api.load(tmp_path / "a.h5").title.endswith(f"by continuing {found.title}, frame 9")
-    with pytest.raises(ConfigurationError, match="a run in full order is required"):
+    with pytest.raises(ConfigurationError, match="a complete full-order run is required"):
         api.train(found)
 
 
@@ -74,9 +74,9 @@ def test_a_run_goes_on_only_on_its_mesh_and_from_a_frame_of_it():
 
 @pytest.mark.parametrize(
     ("effect", "words"),
-    [(HANDLE, "'translate' begins before frame 5, .* it would jump; start: 5 begins it there"),
+    [(HANDLE, "'translate' begins before frame 5, .* would jump; set start: 5"),
      ({"effect": "poke", "over": 8, "count": 1}, "'poke' begins before frame 5"),
-     (VELOCITY, "'velocity' acts at frame 0 only, .* leave it out")],
+     (VELOCITY, "'velocity' acts at frame 0 only, .* remove it")],
 )  # fmt: skip
 def test_a_motion_that_should_have_begun_before_a_run_goes_on_is_refused(effect, words):
     first = api.run(scene(SPRING, {**HANDLE, "offset": [0, 0, 1]}))
