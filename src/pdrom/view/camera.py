@@ -130,7 +130,7 @@ def shown_region(
 
 
 def obstacles(positions: np.ndarray, effects: Sequence[EffectConfig]) -> list[Mesh]:
-    """Surfaces of obstacles in the `shown_region` of a run, the largest first (drawn behind)."""
+    """Surfaces of obstacles in the `shown_region` of a run, the largest first, drawn behind."""
     region = shown_region(positions, effects)
     found = [body for effect in effects if (body := effect.body(*region))]
     return sorted(found, key=lambda body: -float(np.ptp(body.points, axis=0).max()))

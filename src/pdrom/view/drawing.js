@@ -1,6 +1,6 @@
 "use strict";
-// Draws surfaces that move: by WebGL2 where there is one, else with the canvas's own lines and triangles. A layer has
-// positions (n, 3), or a basis (n, K) that its coordinates (K, 3) are lifted by: on the graphics card where there is one.
+// Draws moving surfaces by WebGL2, or without it by lines and triangles of the canvas. A layer has
+// positions (n, 3), or a basis (n, K) that maps coordinates (K, 3) to positions, on the graphics card if there is one.
 const pdromDrawing = (() => {
   const WIDTH = 2048; // of a texture that holds a basis
   const MOST = 200; // coordinates that are lifted on the graphics card; more are lifted here
@@ -94,7 +94,7 @@ const pdromDrawing = (() => {
       this.version++;
     }
 
-    // Positions (n, 3); lifted here if nobody did so far.
+    // Positions (n, 3), computed from the coordinates unless that was done before.
     get current() {
       if (this.basis && this.stale) this.lift(this.positions);
       this.stale = false;
@@ -112,7 +112,7 @@ const pdromDrawing = (() => {
       this.home = this.eye;
     }
 
-    // A ball that is seen whole: its centre and radius, m.
+    // Centre and radius, m, of a ball that the picture shows completely.
     look(centre, radius) {
       Object.assign(this, { centre, radius });
     }
@@ -175,7 +175,7 @@ const pdromDrawing = (() => {
     constructor(gl) {
       this.gl = gl;
       this.programs = [false, true].map((lifted) => this._program(VERTEX(lifted)));
-      this.buffers = new WeakMap(); // the card frees what belongs to a layer that is gone
+      this.buffers = new WeakMap(); // the card frees the buffers of removed layers
       this.scale = Float32Array.from(VIRIDIS.flat());
     }
 
@@ -260,7 +260,7 @@ const pdromDrawing = (() => {
       }
       own.valued = layer.valued;
       gl.depthMask(layer.alpha === 1);
-      gl.depthFunc(layer.look === "wires" && layer.alpha < 1 ? gl.ALWAYS : gl.LESS); // seen through what lies before them
+      gl.depthFunc(layer.look === "wires" && layer.alpha < 1 ? gl.ALWAYS : gl.LESS); // visible through surfaces in front of them
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, own.indices);
       const mode = { surface: gl.TRIANGLES, wires: gl.LINES, points: gl.POINTS }[layer.look];
       gl.drawElements(mode, layer.indices.length, gl.UNSIGNED_INT, 0);
@@ -277,7 +277,7 @@ const pdromDrawing = (() => {
     }
   }
 
-  // ---- without: the farthest first ----
+  // ---- without WebGL2: the farthest triangle first ----
 
   class Plain {
     constructor(context) {
@@ -352,7 +352,7 @@ const pdromDrawing = (() => {
     }
   }
 
-  // ---- a canvas with layers, a camera, and what pointers and keys do with it ----
+  // ---- a canvas with layers and a camera that pointers and keys move ----
 
   class Drawing {
     // options: up and eye (directions); plain: whether to do without WebGL; grab(x, y, looking) at a place on the canvas,
@@ -366,7 +366,7 @@ const pdromDrawing = (() => {
       this._watch();
     }
 
-    // The card is gone: canvases cannot change their kind, so that another one takes the place.
+    // The graphics card is lost: a canvas cannot change its kind, so another canvas replaces it.
     _lost() {
       const other = this.canvas.cloneNode(false);
       this.canvas.replaceWith(other);
@@ -375,7 +375,7 @@ const pdromDrawing = (() => {
       this.redraw();
     }
 
-    // The same canvas, seen from elsewhere.
+    // Views the canvas from another direction.
     from({ up, eye }) {
       Object.assign(this.camera, new Camera(up, eye));
     }
@@ -403,7 +403,7 @@ const pdromDrawing = (() => {
       const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
       if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
       if (!this.camera.radius) return;
-      // what is translucent comes last
+      // translucent layers are drawn last
       const ordered = [...this.layers].sort((a, b) => b.alpha - a.alpha);
       this.pen.draw(ordered, this.views, this.camera);
     }
@@ -419,7 +419,7 @@ const pdromDrawing = (() => {
     fit(q) {
       const { canvas, camera } = this, axes = camera.axes(), [f, g] = focuses(canvas.clientWidth / this.views / canvas.clientHeight);
       const seen = Array.from({ length: q.length / 3 }, (_, v) => axes.map((axis) => dot(axis, q.subarray(3 * v))));
-      // how far in front of the origin a point is inside a rim of the picture, or in front of the eye
+      // distance from the origin at which a point is inside a rim of the picture, or in front of the eye
       const most = (x, y, z) => Math.max(...seen.map((p) => (x * p[0] + y * p[1]) / FILLED + z * p[2]));
       const [right, left, up, down] = [most(f, 0, 1), most(-f, 0, 1), most(0, g, 1), most(0, -g, 1)], near = most(0, 0, 1), end = -most(0, 0, -1);
       const middle = [(right - left) * FILLED / f, (up - down) * FILLED / g, near + end].map((x) => 0.5 * x);
@@ -427,7 +427,7 @@ const pdromDrawing = (() => {
       return [[0, 1, 2].map((i) => dot(axes.map((axis) => axis[i]), middle)), away / Math.hypot(1, FOCUS)];
     }
 
-    // Move in space of a move on the canvas (CSS pixels) at the depth of a point.
+    // Displacement in space that a move on the canvas (CSS pixels) means at the depth of a point.
     moved(right, down, point) {
       const wide = this.canvas.clientWidth / this.views, high = this.canvas.clientHeight, m = this.camera.matrix(wide / high);
       const w = applied(m, ...point)[2], [x, y] = this.camera.axes(), least = Math.min(wide, high);
@@ -501,7 +501,7 @@ const pdromDrawing = (() => {
     return [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16) / 255);
   }
 
-  // The entries of a list; one that has a single entry is text.
+  // The entries of a list; a list with a single entry is shown as text.
   function fill(select, values, words = String) {
     const before = select.value;
     select.replaceChildren(...values.map((value) => new Option(words(value), value)));

@@ -1,6 +1,6 @@
 "use strict";
-// Runs models of position subspaces: the arithmetic of pdrom.reduction.subspace, in doubles. No document, no clock:
-// it runs in a page as in a test. Matrices are Float64Arrays by rows; coordinates are (K, 3).
+// Runs models of position subspaces with the arithmetic of pdrom.reduction.subspace, in doubles. It uses no document
+// and no clock, so that it runs in a page as in a test. Matrices are Float64Arrays by rows; coordinates are (K, 3).
 const pdromEngine = (() => {
   const SWEEPS = 12, ORTHOGONAL = 1e-15, LAST_TANGENT = 1e-8, RANK = 1e-15; // as in svd3.py
   const STEPS = 16, WELL_CONDITIONED = 1e-2, LAST_STEP = 1e-18; // as in tetrahedron.py
@@ -52,7 +52,7 @@ const pdromEngine = (() => {
     return out;
   }
 
-  // Cholesky factor of a positive definite (n, n); an error if it is none.
+  // Cholesky factor of a matrix (n, n); an error if it is not positive definite.
   function cholesky(a, n) {
     const factor = new Float64Array(n * n);
     for (let i = 0; i < n; i++) for (let j = 0; j <= i; j++) {
@@ -176,7 +176,7 @@ const pdromEngine = (() => {
     }
   }
 
-  // Nearest rotation by Newton's iteration; whether F is suited.
+  // Nearest rotation by Newton's iteration; false if F does not suit the iteration.
   function toRotation(d, p, at) {
     let square = 0;
     for (let i = 0; i < 9; i++) square += d[at + i] * d[at + i];
@@ -293,7 +293,7 @@ const pdromEngine = (() => {
     return withFirst(3, rows.flat().map((x) => x / det));
   }
 
-  // ---- one group of a model: strain D (m p, K) of what it samples, and its projections ----
+  // ---- one group of a model: strain D (m p, K) of its sampled elements, and their projections ----
 
   class Group {
     constructor(file, kind, samples, basis) {
@@ -348,7 +348,7 @@ const pdromEngine = (() => {
       }
     }
 
-    // Adds what its projections at z (K, 3) push with to rhs (K, 3).
+    // Adds the forces of its projections at z (K, 3) to rhs (K, 3).
     accumulate(z, K, rhs) {
       times(this.strain, z, K, this.gradients);
       this.project();
@@ -411,7 +411,7 @@ const pdromEngine = (() => {
       return out;
     }
 
-    // Coordinates of the field that is nearest, in the mass inner product, to positions of all vertices.
+    // Coordinates of the field nearest to the positions of all vertices, in the mass inner product.
     coordinates(q) {
       const K = this.size, { masses } = this.file, h = this.file.timeStep;
       if (!this._mass) {
@@ -447,7 +447,7 @@ const pdromEngine = (() => {
       this.z = Float64Array.from(basis.start.positions);
       this.v = Float64Array.from(basis.start.velocities);
       this.frame = 0;
-      this.taken = new Map(); // atom -> coordinates where it was taken hold of
+      this.taken = new Map(); // atom -> coordinates at which the reader took it
     }
 
     // Atoms that the scene holds in a frame.
@@ -472,7 +472,7 @@ const pdromEngine = (() => {
       return this.eliminations.get(key);
     }
 
-    // One frame. held: Map atom -> offset [x, y, z] m from where it was taken hold of; by default what the scene holds.
+    // Computes a frame. held: Map atom -> offset [x, y, z] m from the place where it was taken; default: as in the scene.
     step(held = new Map([...this.scheduled(this.frame)].map((a) => [a, [0, 0, 0]]))) {
       const K = this.K, h = this.file.timeStep, { z, v } = this, s = new Float64Array(3 * K);
       const a = this._acceleration(v);
@@ -525,7 +525,7 @@ const pdromEngine = (() => {
       return y;
     }
 
-    // Floors: looked for at the probes, and where one is below, all vertices that are not held are lifted.
+    // Floors: if a probe is below a floor, all vertices below it that are not held are lifted.
     _correct(y, atoms) {
       for (const height of this.file.floors) {
         const heldVertices = new Set(atoms.flatMap((a) => this.basis.atoms[a]));

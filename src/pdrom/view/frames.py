@@ -37,7 +37,7 @@ def write_frames(scene: ViewedScene, png: Path) -> None:
 
 
 def _draw(scene: ViewedScene) -> Figure:
-    """Draw one row of pictures per run; a grey outline shows the full order in reduced runs."""
+    """Draw one row of pictures per run; grey outlines in reduced runs show the full-order run."""
     # the scene and its obstacles are turned so that y points up
     turn, found = rotation_to(up_of(scene.effects)), obstacles(scene.positions, scene.effects)
     bodies = [replace(body, points=body.points @ turn) for body in found]
@@ -64,7 +64,7 @@ def _draw(scene: ViewedScene) -> Figure:
 
 
 def _panel(number: int, run: ViewedRun, frame: int) -> RunPanel:
-    """Panel of reduced run ``number`` at ``frame``, or at its last with the reason of its end."""
+    """Return the panel of reduced run ``number`` at ``frame``, or at its last frame if it ended."""
     last, failure, remark = len(run.positions) - 1, None, None
     if frame > last:
         failure = "ended" if run.blowup_frame is None else f"blew up at frame {run.blowup_frame}"
@@ -110,7 +110,7 @@ def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
     """Data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
 
     Displacement from the initial state (m) of the full-order run; for each reduced run its
-    positions minus those of the full order (m), NaN after the end of the reduced run.
+    positions minus those of the full-order run (m), NaN after the reduced run's end.
     """
     now = scene.positions[frame]
     data = {"displacement": now - scene.positions[0]}
@@ -122,6 +122,6 @@ def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
 
 
 def _mark(path: Path) -> None:
-    """Append the comment that tells pdrom that the XML file ``path`` is its own (`require_own`)."""
+    """Append the comment by which `require_own` knows that pdrom made the XML file ``path``."""
     with open(path, "ab") as file:
         file.write(b"\n<!-- " + MARK + b" -->\n")

@@ -1,21 +1,21 @@
 "use strict";
-// The page's own script: choices, handles, the loop of frames, and what is said about them.
+// Script of the page of models: choices, handles, the loop of frames, and texts about them.
 (() => {
   const { Drawing, Layer, colour, fill } = pdromDrawing;
   const SPEED = 0.03; // a handle moves at most this part of the scene's size a frame
   const REACH = 26; // CSS pixels from a handle's vertex within which a pointer takes it
   const KEY_STEP = 0.04; // of the scene's size
-  const LAG = 0.25; // part of its way to the shape that the camera goes in a frame
-  const SAMPLE = 400; // vertices by which the camera follows the shape, at most
+  const LAG = 0.25; // fraction of the distance to the shape by which the camera moves in a frame
+  const SAMPLE = 400; // largest number of vertices by which the camera follows the shape
   const TOLD = 200; // ms between two updates of the numbers
-  const MOST_ITERATIONS = 40; // that a reader may choose, unless the scene has more
+  const MOST_ITERATIONS = 40; // largest choice of a reader, unless the scene has more
   const EARLY = 4; // ms: screens do not keep time exactly
   const FORMAT = 1; // of the data, as in exported.py
-  const METHODS = { all: "all elements", elements: "whole elements", joint: "joint rows" };
+  const METHODS = { all: "all elements", elements: "sampled elements (ECSW)", joint: "one shared row for x, y, z" };
   const at = (id) => document.getElementById(id);
   const scenes = JSON.parse(at("scenes").textContent);
   const loaded = new Map(); // scene -> promise of its unpacked file
-  const waiting = new Map(); // scene -> takes its file when that has come
+  const waiting = new Map(); // scene -> function that takes its file when it has arrived
   let shown = null; // {data, frames, bases}: the scene
   let run = null, handles = [], times = [], dragging = false;
   let playing = true, told = 0, due = 0, drawing = null, layers = {}, unknown = "", measured = "";
@@ -28,16 +28,16 @@
       waiting.set(scenes[index].scene, resolve);
       const script = document.createElement("script");
       script.src = file;
-      script.onerror = () => reject(new Error(`${file} is missing; it belongs beside this page`));
-      // a whole file has made its call before
-      script.onload = () => reject(new Error(`${file} is cut, or not of this scene`));
+      script.onerror = () => reject(new Error(`${file} is missing; put it next to this page`));
+      // a complete file has made its call already
+      script.onload = () => reject(new Error(`${file} is cut, or belongs to another scene`));
       document.head.append(script);
     }).then(unpacked));
     return loaded.get(index);
   }
 
   async function unpacked({ format, shown: { full, ...rest } = {}, ...others }) {
-    if (format !== FORMAT) throw new Error("its data are of another version of pdrom");
+    if (format !== FORMAT) throw new Error("its data are from another version of pdrom");
     const [data, frames] = await Promise.all([
       pdromPacked.unpacked({ ...others, shown: rest }), pdromPacked.frames(full)]).catch(() => { throw new Error("its data are damaged"); });
     return { data, frames, bases: new Map() };
@@ -78,10 +78,10 @@
     leave();
     const index = Number(at("scene").value);
     const found = await load(index).catch((error) => {
-      loaded.delete(index); // it may be there the next time
+      loaded.delete(index); // the file may exist the next time
       return error;
     });
-    if (index !== Number(at("scene").value)) return; // another one was chosen in the meantime
+    if (index !== Number(at("scene").value)) return; // another scene was chosen in the meantime
     if (found instanceof Error) return say(`This scene cannot be shown: ${found.message}.`, true);
     shown = found;
     for (const id of ["wires", "apart"]) at(id).hidden = shown.data.motion === null;
@@ -109,9 +109,9 @@
     at("elements").textContent = `${run.elements} of ${all()}`;
     at("drag").hidden = handles.length === 0;
     const parts = [`${data.title}.`, model.family === "joint"
-      ? `Joint rows: ${model.r} modes of the projections, interpolated at ${run.elements} elements (the preprint's way).`
+      ? `As in the preprint, ${model.r} modes of the projections are interpolated at ${run.elements} elements, with one shared row for x, y, z.`
       : model.family === "all" ? "All elements are evaluated."
-      : "Whole elements with weights, sampled so that the equations keep their energy.", drawing.accelerated
+      : "A few elements, with weights, replace all of them (energy-conserving sampling and weighting, ECSW).", drawing.accelerated
       ? "Drawn by WebGL2." : "This browser has no WebGL2: the picture is drawn on the processor, and slower."];
     at("about").textContent = parts.join(" ");
     play(true);
@@ -131,7 +131,7 @@
     run.iterations = count;
   }
 
-  // Atom -> offset in the coming frame: what the scene holds, and what the reader does.
+  // Atom -> offset in the coming frame, as prescribed by the scene and by the reader.
   function held() {
     const scheduled = run.scheduled(run.frame), result = new Map();
     for (const handle of handles) {
@@ -143,7 +143,7 @@
     return result;
   }
 
-  // A handle goes towards where the reader wants it, at a bounded speed.
+  // A handle moves towards its target at a bounded speed.
   function follow(handle) {
     const most = SPEED * drawing.camera.radius, way = handle.wanted.map((x, i) => x - handle.offset[i]);
     const length = Math.hypot(...way), part = length > most ? most / length : 1;
@@ -169,7 +169,7 @@
 
   // ---- pictures ----
 
-  // Layers of a run: its surface, the recorded run as wires, the handles, the floor.
+  // Layers of a run: its surface, the full-order run as wires, the handles, the floor.
   function make() {
     const { data } = shown, { vertices, triangles } = data.shown, K = run.K, n = vertices.length;
     const B = new Float32Array(n * K);
@@ -197,7 +197,7 @@
     return layer;
   }
 
-  // The camera goes with the shape, and back until it sees all of it, but not while a reader drags a part.
+  // The camera follows the shape and keeps all of it in view, but stays still while a reader drags a handle.
   function followShape() {
     if (dragging || !run.finite) return;
     const { camera } = drawing, [centre, radius] = drawing.fit(sampled());
@@ -214,7 +214,7 @@
     drawing.redraw();
   }
 
-  // Positions of the recorded run at a frame, between two stored ones if need be; null after its end.
+  // Positions of the full-order run at a frame, interpolated between stored frames; null after its end.
   function recordedAt(frame) {
     const { frames, data: { motion, shown: { stride } } } = shown, place = frame / stride;
     return motion === null || place > frames.length - 1 ? null : pdromPacked.between(frames, place);
@@ -233,12 +233,12 @@
   }
 
   function tell() {
-    say(run.finite ? unknown : "The run is no longer finite.", !run.finite || unknown !== "");
+    say(run.finite ? unknown : "The simulation blew up: its numbers are not finite. Start again.", !run.finite || unknown !== "");
     const { data } = shown, sorted = [...times].sort((a, b) => a - b), recorded = recordedAt(run.frame);
     at("frame").textContent = `${run.frame}, ${(run.frame * data.timeStep).toFixed(2)} s`;
     at("ms").textContent = sorted.length ? `${sorted[sorted.length >> 1].toFixed(2)} ms` : "";
     if (recorded && !mine() && run.frame % data.shown.stride === 0) measured = percent(difference(recorded));
-    at("distance").textContent = mine() ? "your motion was not recorded" : recorded ? measured : "the recording has ended";
+    at("distance").textContent = mine() ? "unknown: you moved a handle" : recorded ? measured : "unknown: the full-order run has ended";
     document.body.dataset.frame = run.frame;
     at("handles").querySelectorAll("button.hold").forEach((button, i) => {
       const { held: on, name } = handles[i], text = on ? `Let go of ${name}` : `Hold ${name}`;
@@ -247,7 +247,7 @@
     });
   }
 
-  // Distance of the drawn surface from the recorded one over its mean motion, as the study's tables have it.
+  // Distance of the surface from that of the full-order run, over its mean displacement, as in the study's tables.
   function difference(recorded) {
     const { vertices } = shown.data.shown, q = run.basis.lift(run.z, vertices, new Float64Array(3 * vertices.length));
     let square = 0;
@@ -321,7 +321,7 @@
     at("play").textContent = playing ? "Pause" : "Play";
   }
 
-  // A frame of the run takes its own time step, on faster screens too; slower ones show it slowly.
+  // A frame is shown for its time step, also on faster screens; on slower screens the run takes longer.
   function beat(now) {
     requestAnimationFrame(beat);
     if (!run) return;
@@ -354,7 +354,7 @@
   const names = scenes.map(({ scene: name }) => name), asked = [...new URLSearchParams(location.search).keys()];
   const named = names.findIndex((name) => asked.includes(name));
   const foreign = [...asked, location.hash].filter((word) => !["", "#plain", ...names].includes(word));
-  if (scenes.length === 0) say("No scene of this study has models: its configuration lists none of them.", true);
+  if (scenes.length === 0) say("There is nothing to show: the configuration lists no scene with models.", true);
   else {
     at("scene").value = Math.max(named, 0);
     if (foreign.length) unknown = `This page has no ${foreign.join(", ")}: it shows ${names[Math.max(named, 0)]}.`;

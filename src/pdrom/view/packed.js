@@ -1,5 +1,5 @@
 "use strict";
-// Reads what pdrom.core.packed writes.
+// Reads arrays that pdrom.core.packed wrote.
 const pdromPacked = (() => {
   async function bytes(text) {
     const raw = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));

@@ -1,6 +1,6 @@
 """HTML pages that show runs, or run models: scripts and data in one file.
 
-Of a run, a page has the surface vertices alone, in some of its frames, quantised to 16 bits."""
+A page stores only the surface vertices of a run, in some frames, quantised to 16 bits."""
 
 import json
 import os
@@ -47,7 +47,7 @@ class ViewedScene:
     positions : (F + 1, N, 3) m of the full-order run
     ms : milliseconds per frame of the full-order run, None if not measured
     effects : effects of the scene; obstacles among them are drawn
-    method : what computed the run that is shown as full-order run, if another did
+    method : model that computed the run in place of the full-order run
     """
 
     name: str
@@ -62,7 +62,7 @@ class ViewedScene:
 
 
 LARGEST = 25_000_000  # largest number of bytes of a page
-# Files beside this module of which a page is made, its template first.
+# Files next to this module that make up a page, its template first.
 VIEWER = ("viewer.html", "viewer.css", "packed.js", "drawing.js", "viewer.js")
 LIVE = ("live.html", "live.css", "packed.js", "engine.js", "drawing.js", "live.js")
 
@@ -76,14 +76,14 @@ def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> N
 def require_page(path: str | os.PathLike[str]) -> None:
     """Raise ConfigurationError if ``path`` is not the name of a page."""
     if not os.fspath(path).lower().endswith((".html", ".htm")):
-        raise ConfigurationError(f"{path}: the name of a page ends in .html")
+        raise ConfigurationError(f"{path}: a page is HTML; choose a name in .html")
 
 
 def page_of(parts: Sequence[str], scenes: Sequence[Mapping[str, Any]]) -> str:
     """Text of the page of ``parts`` (`VIEWER`, `LIVE`) with ``scenes``, the data of its script.
 
-    An entry of `LIVE` has a ``scene``'s name and ``content``, or the ``file`` beside the page that
-    has the content. StorageError if the page has more than `LARGEST` bytes.
+    An entry of `LIVE` has a ``scene``'s name and its ``content``, or a ``file`` next to the page
+    with the content. StorageError if the page has more than `LARGEST` bytes.
     """
     texts = {name: files("pdrom.view").joinpath(name).read_text("utf-8") for name in parts}
     text = filled(texts[parts[0]], {**texts, "SCENES": safe_json(scenes)})
@@ -105,7 +105,7 @@ def filled(template: str, parts: dict[str, str]) -> str:
 
 
 EYE = np.array([0.85, 0.55, 1.45])  # direction to the viewer if y points up, else it is rotated
-FRAMES = 75  # largest number of frames of a run on the page, which skips the others
+FRAMES = 75  # largest number of frames of a run on the page; the others are skipped
 
 
 def pack_scene(scene: ViewedScene) -> dict[str, Any]:

@@ -142,7 +142,7 @@ ABOVE, LINE, BELOW = 0.19, 0.13, 0.07  # inches: heights of a title, a text line
 
 @dataclass(frozen=True)
 class Row:
-    """Row of n panels, each with a window of its own.
+    """Row of n panels, each with a separate window.
 
     ghosts : (n, N, 3) m, shapes of the reference run, outlined behind the reduced runs
     note : text in place of the reduced runs, for an experiment in which none ran

@@ -1,8 +1,8 @@
 "use strict";
-// The page's own script: choices, frames, playing, the chart of errors.
+// Script of the page of runs: choices, frames, playing, the chart of errors.
 (async () => {
   const { Drawing, Layer, colour, fill } = pdromDrawing;
-  const LOWEST = 1e-12, HIGHEST = 1e6; // errors outside are drawn on the rim, whatever the axis
+  const LOWEST = 1e-12, HIGHEST = 1e6; // errors outside are drawn on the rim of the chart
   const WIDTH = 400, HEIGHT = 360, LEFT = 52, RIGHT = 8, TOP = 24, BOTTOM = 64; // of the chart, in its own units
   const CUBE = 0.5; // of the shown cube's side: radius of the ball that the camera sees
   const at = (id) => document.getElementById(id);
@@ -25,7 +25,7 @@
     return [scene, scene.runs[at("run").value] || null];
   }
 
-  // Whether both runs are in one picture, the full order as wires: two surfaces in one place would flicker.
+  // Whether both runs are in one picture, the full-order run as wires: two surfaces in one place would flicker.
   const above = () => at("view").value === "above" && shown.reduced;
 
   async function choose() {
@@ -68,7 +68,7 @@
     at("largest").textContent = `${(0.1 * side() / 1.4).toPrecision(2)} and more`;
   }
 
-  // Draws frame k of what is stored, which may lie between two of them.
+  // Draws frame k of the stored frames; k may lie between two of them.
   function show(k) {
     const full = pdromPacked.between(shown.full, k);
     layers.full.set(full);
@@ -87,7 +87,7 @@
     document.body.dataset.frame = stored;
   }
 
-  // Distances of vertices over a largest one.
+  // Distances of vertices, relative to the largest distance.
   function distances(a, b, most) {
     const values = new Float32Array(a.length / 3);
     for (let i = 0, v = 0; v < values.length; v++, i += 3) {
@@ -103,7 +103,7 @@
   const x = (frame) => LEFT + (WIDTH - LEFT - RIGHT) * frame / Math.max(1, (shown.full.length - 1) * shown.scene.stride);
   const y = (error, [low, high]) => TOP + (HEIGHT - TOP - BOTTOM) * (high - Math.log10(error)) / (high - low);
 
-  // Decades of the axis: those of the scene's errors, for all its runs the same ones.
+  // Decades of the error axis, the same for all runs of the scene.
   function decades(scene) {
     const values = scene.runs.flatMap((run) => run.error).filter((error) => error > 0).map(clipped);
     if (!values.length) return [-2, 0];
@@ -123,7 +123,7 @@
     return element("text", { x: left, y: down, "text-anchor": anchor }, text);
   }
 
-  // Places of known errors; a gap where none is known.
+  // Path through the known errors, with gaps where the error is unknown.
   function path(values, range) {
     let pen = "M";
     return values.map((error, f) => {
@@ -171,7 +171,7 @@
     const { scene, run } = shown, ms = (value) => (value === null ? "not timed" : `${value.toPrecision(3)} ms a frame`);
     const parts = [`${scene.title}.`, `${scene.method[0].toUpperCase()}${scene.method.slice(1)}: ${ms(scene.ms)}.`];
     if (run) parts.push(`Reduced: ${ms(run.ms)}.`);
-    if (run) parts.push(`Relative error: distance of the two runs over the full order's motion (its distance from the start, root mean square over the frames); ${told(run)}.`);
+    if (run) parts.push(`Relative error: distance between the two runs, divided by the full-order displacement (root mean square over the frames); ${told(run)}.`);
     if (run && run.blowup !== null) parts.push(`The reduced run blew up at frame ${run.blowup}.`);
     if (!drawing.accelerated) parts.push("This browser has no WebGL2: pictures are drawn on the processor, and slower.");
     at("about").textContent = parts.join(" ");
@@ -184,7 +184,7 @@
     return parts.join(", ");
   }
 
-  // ---- playing: in the scene's own time ----
+  // ---- playing: in the time of the scene ----
 
   function stop() {
     playing = null;
