@@ -70,7 +70,7 @@ def test_lost_rows_and_a_killed_job_are_named_and_made_again(undisturbed, sandbo
     output = process.communicate(timeout=600)[0]
     assert process.returncode != 0
     assert f"{SNAPSHOTS}: damaged, its c" in last_lines(output)
-    assert f"set aside as {Path(SNAPSHOTS).name}.damaged, the next run" in last_lines(output)
+    assert f"renamed to {Path(SNAPSHOTS).name}.damaged, the next run" in last_lines(output)
     status, output = sandbox.run(TABLE, fault="kill:reconstruction_error")
     assert status != 0
     for part in ("job reconstruction_error_table failed", TABLE, "SIGKILL"):

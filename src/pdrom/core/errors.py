@@ -1,4 +1,4 @@
-"""Error classes; a message is one line: file or object, key, value and allowed values."""
+"""Error classes; a message is one line with the file or object, key, value and allowed values."""
 
 import errno
 import os
@@ -69,7 +69,7 @@ class SnapshotError(PdromError):
 
 
 class RankError(PdromError):
-    """More modes were requested than the snapshots have singular values above round-off."""
+    """More modes were requested than the snapshots have singular values above rounding errors."""
 
 
 class SamplingError(PdromError):

@@ -2,8 +2,8 @@
 
 Inside the context `made_by`, `pdrom.core.store` stores the provenance beside the checksum of every
 file it writes, in HDF5 files also as attributes. Two runs of one job have equal provenance: it
-contains no date and no commit, since a commit may change only documentation. For a job of the
-workflow it is the identity of a file: a copy of it under another name is not taken for the result.
+contains no date and no commit, since a commit may change only documentation. In the workflow it
+identifies a file: a copy under another name does not count as the result.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ RECORD = (
     "made_by", "configuration_sha256", "code_sha256", "pdrom_version", "python_version",
     "library_versions",
 )  # fmt: skip
-# Keys that tell which result a file is; the first and the last are in its checksum only.
+# Keys that identify a result; the first and the last are stored only in its checksum.
 ORIGIN = ("file", *RECORD[:3], "inputs_sha256")
 
 # Name and configuration hash of the running job, and its configuration as canonical JSON.
@@ -73,7 +73,7 @@ def attributes() -> dict[str, str]:
 
 
 def provenance(path: str | os.PathLike[str] = "") -> dict[str, str]:
-    """Provenance of the file ``path`` that is written now; without a running job it names no job.
+    """Return the provenance of the file ``path`` that is being written, by the running job if any.
 
     The files of the workflow also record their path, and a hash of their job's inputs.
     """

@@ -34,10 +34,10 @@ class Basis:
     V: np.ndarray
     mean: np.ndarray
     singular_values: np.ndarray  # all of the matrix of weighted, centred training snapshots
-    rank: int  # number of singular values above round-off: columns of V
+    rank: int  # number of singular values above rounding errors: columns of V
     roundoff: float  # singular values up to this absolute size are noise
     rows_per_element: int
-    active_axes: tuple[bool, ...]  # for each axis x, y, z, whether its snapshots exceed round-off
+    active_axes: tuple[bool, ...]  # for x, y, z: whether snapshots exceed rounding errors
     origin: str = "basis"  # name in error messages: the path of its file
 
     __repr__ = brief
@@ -53,7 +53,7 @@ class Basis:
             allowed = f"allowed are 1 to {self.rank}" if self.rank else "there is nothing to reduce"
             raise RankError(
                 f"{self.origin}: r = {r}, the snapshots have numerical rank {self.rank} "
-                f"(round-off {self.roundoff:.1e}): {allowed}"
+                f"(rounding errors {self.roundoff:.1e}): {allowed}"
             )
         return self.V[:, :r]
 
@@ -110,7 +110,7 @@ def compute_basis(
         centring "mean-in-modes", which adds the first snapshot to every mode.
     """
     _check(snapshots, row_mass, rows_per_element, spec)
-    require_finite("round-off of the snapshots", np.array([roundoff]), SnapshotError)
+    require_finite("rounding errors of snapshots", np.array([roundoff]), SnapshotError)
     largest = float(np.abs(snapshots).max())
     if largest > 0.0 and not SMALL <= largest <= 1.0 / SMALL:
         unit = 2.0 ** (np.frexp(largest)[1] - 1)  # a power of two, so that scaling is exact
@@ -128,7 +128,7 @@ def compute_basis(
     if spec.centring == "affine":
         # The mean of n snapshots has a rounding error of at most n eps/2 times the mean of their
         # magnitudes (Higham 2002, section 4.2), and so has every centred snapshot. Without this
-        # bound of its norm over all n, constant snapshots would get modes of round-off.
+        # bound of its norm over all n, constant snapshots would get spurious modes.
         rounded = 0.5 * np.finfo(float).eps * matrix.shape[1] * float(np.linalg.norm(matrix))
         mean, error = matrix.mean(axis=1), max(roundoff, rounded)
         # with this centring an axis (x, y, z) with constant snapshots counts as inactive, see below
@@ -137,8 +137,8 @@ def compute_basis(
         mean = matrix[:, 0].copy()
     centred = (matrix - mean[:, None]) * scale[:, None]
     noise = error * float(scale.max())
-    # an axis is active if the norm of its snapshots exceeds both the round-off of the data and that
-    # of an SVD, which is relative to the largest of the three norms
+    # an axis is active if the norm of its snapshots exceeds the rounding errors of the data and
+    # those of an SVD, which are relative to the largest of the three norms
     norms = np.array([np.linalg.norm(shown[axis::3]) for axis in range(3)])
     least = max(error, max(shown.shape) * np.finfo(float).eps * norms.max())
     active = tuple(bool(norm > least) for norm in norms)
@@ -250,22 +250,22 @@ def fix_signs(u: np.ndarray) -> np.ndarray:
     """Return ``u`` (n, m) with the sign of each column changed so that its largest entry is > 0.
 
     Magnitudes are rounded to single precision before they are compared. Of several entries that are
-    equal up to round-off, the first thus decides.
+    equal up to rounding errors, the first thus decides.
     """
     largest = [np.argmax(np.abs(mode).astype(np.float32)) for mode in u.T]
     signs = np.sign(u[largest, np.arange(u.shape[1])])
     return u * np.where(signs == 0.0, 1.0, signs)
 
 
-# `thin_qr` accepts its factor Q_1 as orthonormal if |Q_1^T Q_1 - I| is at most this. Round-off
-# alone gives 1e-14 to 1e-13; if its matrix L has the condition number 1e2, it is about 1e-12.
+# `thin_qr` accepts its factor Q_1 as orthonormal if |Q_1^T Q_1 - I| is at most this. Rounding
+# errors give 1e-14 to 1e-13; if its matrix L has the condition number 1e2, it is about 1e-12.
 DEPARTURE = 1e-12
 
 
 def thin_qr(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Factor A = ``matrix`` (n, m), n > m, as (Q_1 R_2^-1) R; return Q_1, R_2 (m, m), R (m, m).
 
-    Q_1 R_2^-1 has orthonormal columns up to round-off, also where A has no full rank. The product
+    Q_1 R_2^-1 has orthonormal columns, also where A has no full rank. The product
     is not formed: a caller needs Q_1 R_2^-1 C with a small matrix C, and R_2^-1 C costs less.
 
     Householder reflections read A once per column and wait for memory. Here (Terao, Ozaki and
@@ -298,7 +298,7 @@ def _by_reflections(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 def numerical_rank(singular_values: np.ndarray, shape: tuple[int, int], roundoff: float) -> int:
-    """Number of ``singular_values`` (n,) of a matrix of ``shape`` that exceed two round-off levels.
+    """Number of ``singular_values`` (n,) of a matrix of ``shape`` that exceed two error levels.
 
     The relative level max(shape) eps sigma_1 is the backward error of the SVD; the absolute level
     ``roundoff`` is the error of the data, which may be differences of cancelling terms.

@@ -18,7 +18,7 @@ from pdrom.model.runs import BLOWUP_EXTENT
 from pdrom.model.scene import Scene
 from pdrom.reduction.rerun import Rerun, displacement_norms, rerun, step_norms
 
-# Names of series over frames: of a full-order run; of another run, or its difference from it.
+# Names of series over frames: of a full-order run; of another run, or of the difference of both.
 CONVERGED = ("displacement_converged", "deformed_converged")
 REFERENCE = ("displacement", "deformed", "step", "energy", *CONVERGED)
 DEVIATIONS = (
@@ -47,7 +47,7 @@ class Yardstick:
 
     scene : scene of the full-order run
     reference : (F + 1, N, 3) m, positions of the full-order run; entry 0 is the initial state
-    converged : the same of a run whose frames have converged, to compare with it as well
+    converged : positions of a run with converged frames, for a second comparison
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Yardstick:
 
     @cached_property
     def scale(self) -> EnergyScale:
-        """Energy scale: 0 for the full order's least potential of forces, 1 for its peak total."""
+        """Energy scale: 0 is the least potential of forces of the full-order run, 1 its peak."""
         return EnergyScale.of(self.scene, self.reference)
 
     @cached_property
@@ -152,8 +152,8 @@ class Yardstick:
 
         ``difference``, ``shape_difference`` (without rigid motion), ``step_difference`` (of changes
         of the positions in a frame): (F',) m, norms of the differences of both runs, the first two
-        also from the converged run (empty without it). ``energy`` is of ``outcome`` alone: every
-        `STRIDE`-th frame and its last, scaled by `scale`.
+        also from the converged run (empty without it). ``energy`` is that of ``outcome``, in every
+        `STRIDE`-th frame and the last, scaled by `scale`.
         """
         limit = self.converged
         with np.errstate(over="ignore", invalid="ignore"):

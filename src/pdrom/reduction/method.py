@@ -1,6 +1,6 @@
 """Reduction methods: each combines a basis, a kind of samples, a selection rule and a solver.
 
-methods.yaml gives names to combinations. A selection rule's module is imported on first use.
+The file methods.yaml names the combinations. A selection rule's module is imported on first use.
 """
 
 import re
@@ -57,15 +57,15 @@ class MethodSpec(BasisSpec):
     """A method that reduces the projections of one constraint group.
 
     rows : "all" (orthogonal projection), "scalar" samples single entries (classical DEIM), "joint"
-        rows, with separate coefficients for x, y and z (the preprint's variant), "element" all 3p
-        entries of an element of p rows
+        one shared row for x, y, z with separate coefficients (the preprint's selection), "element"
+        all 3p entries of an element of p rows
     selection : name in `SELECTIONS`, such as "greedy" (largest residual, as in DEIM)
     solve : solution of the sampled equations: "square", least squares by "qr", or normal equations
         with Tikhonov term ("tikhonov", as in the program published with the preprint)
     oversampling : samples per mode; those in excess of one are selected by S-OPT if that is the
         ``selection``, otherwise by GappyPOD+E
-    gain_bound : samples are added (GappyPOD+E) until the gain, the factor by which sampling can
-        amplify the error of the best approximation in the basis, is at most this; None: no bound
+    gain_bound : samples are added (GappyPOD+E) until the DEIM constant, the factor by which
+        sampling can amplify the error of the best approximation, is at most this; None: no bound
     coefficients : "shared" by x, y, z or "per-axis"; None: as ``rows`` and the basis imply
     repeat_rows : whether the greedy selection may repeat a row, as in the preprint authors' program
     title : name of the method in figures and tables

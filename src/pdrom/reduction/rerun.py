@@ -1,4 +1,4 @@
-"""A run of a reduced model, compared with the full-order run frame by frame."""
+"""Run of a reduced model, compared with the full-order run frame by frame."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ def displacement_norms(reference: np.ndarray) -> np.ndarray:
 def step_norms(positions: np.ndarray) -> np.ndarray:
     """Norms (F,) m of the steps between successive frames of ``positions`` (F + 1, N, 3) m.
 
-    They are the time step times norms of velocities; of differences, given those of two runs.
+    They equal the time step times norms of velocities. Differences of two runs may be given, too.
     """
     return np.linalg.norm(np.diff(positions, axis=0), axis=(1, 2))
 

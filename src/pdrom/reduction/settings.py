@@ -1,5 +1,5 @@
-"""Settings that simulate one scene, each a point of error and time: iterations of the full order,
-on the scene's own or on a coarser mesh, or a reduced model.
+"""Settings that simulate one scene, to be compared by error and time: iterations of the full-order
+model, on the scene's mesh or a coarser mesh, or a reduced model.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -30,10 +30,10 @@ class Setting:
     """A method with its settings, ready to run on one scene.
 
     positions : function of the unknowns that returns the positions (N, 3) m of the scene's vertices
-    output : a faster form of it, which is timed; None: the unknowns are these positions
+    output : faster form of ``positions``, which is timed; None: the unknowns are the positions
     """
 
-    labels: dict[str, Any]  # columns that tell it from others
+    labels: dict[str, Any]  # columns that identify the setting
     loop: Stepper
     start: State  # first state, in its unknowns
     positions: Callable[[np.ndarray], np.ndarray] = _same
@@ -42,7 +42,7 @@ class Setting:
     steps: int = 1  # frames of ``loop`` into which a frame of the scene is divided
 
     def run(self, frames: int, extent: float) -> np.ndarray | None:
-        """Run it; return positions (F + 1, N, 3) m at the start and at the ends of F frames.
+        """Run the setting; return positions (F + 1, N, 3) m at the start and after F frames.
 
         None if the run blew up: a side of its bounding box exceeds `BLOWUP_EXTENT` ``extent`` (m).
         """
@@ -54,7 +54,7 @@ class Setting:
         return None if run.blowup_frame is not None else np.stack(found)
 
     def errors(self, truth: Yardstick) -> tuple[np.ndarray | None, float | None, float | None]:
-        """Run it over all frames of ``truth``; return positions, position and deformation error.
+        """Run all frames of ``truth``; return positions, position error and deformation error.
 
         All three are None if the run blew up.
         """
@@ -65,8 +65,8 @@ class Setting:
     def variant(
         self, labels: dict[str, Any], frames: int, starts: Starts = (), warm: int | None = None
     ) -> Variant:
-        """Return it to be timed over ``frames`` frames, or over one from each of ``starts``: pairs
-        (state of all vertices, number of the next frame). An unmeasured run has ``warm`` frames.
+        """Return a variant to time: ``frames`` frames, or one frame from each of ``starts``: pairs
+        (state of all vertices, number of the next frame). A warm-up run has ``warm`` frames.
         """
         own, steps = tuple((self.state(s), self.steps * n) for s, n in starts), self.steps
         warm = None if warm is None else warm * steps
@@ -79,7 +79,7 @@ class Setting:
 def full_order(
     scene: Scene, counts: Iterable[tuple[int, int]], meshes: Sequence[Coarser | None] = (None,)
 ) -> Iterator[Setting]:
-    """Yield the full order of ``scene`` on each of ``meshes``; None is its own.
+    """Yield full-order settings of ``scene`` on each of ``meshes``; None is the scene's mesh.
 
     counts : pairs (iterations of a frame, window of Anderson acceleration or 0)
     """
@@ -94,7 +94,7 @@ def full_order(
 def loop_of(
     labels: dict[str, Any], scene: Scene, mesh: Coarser | None = None, steps: int = 1
 ) -> Setting:
-    """Setting with the step loop of ``scene``, which is that of ``mesh`` if there is one."""
+    """Return a setting with the step loop of ``scene``, built on the coarser ``mesh`` if given."""
     loop = scene.stepper(scene.system, track_objective=False)
     start = scene.initial_state()
     if mesh is None:

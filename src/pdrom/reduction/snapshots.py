@@ -53,10 +53,10 @@ def touched_vertices(group: ConstraintGroup) -> sparse.csr_array:
 def recorded(
     scene: Scene, group: str, state: State, frames: int | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run a scene in full order from ``state``; return positions, projections, their round-off.
+    """Run the full-order model of ``scene`` from ``state``; return positions and projections.
 
     Of the first ``frames`` frames (None: all) these are (F + 1, N, 3) m, (F, e p, 3) of the last
-    local step of the constraint ``group`` (e elements of p rows), and (F,) norms of their errors.
+    local step of the constraint ``group`` (e elements of p rows), and (F,) norms of its errors.
     """
     loop, positions = scene.stepper(track_objective=False), [state.positions]
     own, projections, roundoff = loop.local_step(group), list[np.ndarray](), list[float]()
@@ -73,10 +73,10 @@ def recorded(
 
 @dataclass(frozen=True)
 class SnapshotSet:
-    """Training, test and held-out snapshots (n, e p, 3) of a group of e elements with p rows.
+    """Snapshots (n, e p, 3) of a group of e elements with p rows.
 
-    ``roundoff`` is the Frobenius norm of the rounding errors of the training snapshots: their
-    singular values below it are noise.
+    ``train`` and ``test`` are frames of the training trajectory, ``heldout`` those of a test
+    trajectory. ``roundoff`` is the Frobenius norm of the rounding errors of ``train``.
     """
 
     train: np.ndarray
@@ -96,11 +96,11 @@ def collect(
     masses: np.ndarray,
     train: np.ndarray,
 ) -> SnapshotSet:
-    """Read snapshots of ``group``: training and test frames of one run, frames of a held-out run.
+    """Read snapshots of ``group`` from a training trajectory and a test trajectory.
 
-    Raises SnapshotError if a set is empty, lacks a training frame, or contains NaN or Inf.
+    Raises SnapshotError if a set is empty, lacks a training frame, or is not finite.
 
-    training_run, heldout_run : files of the two full-order runs
+    training_run, heldout_run : files of full-order runs: training and test trajectory
     masses : (N,) kg, masses of the vertices
     train : (n,) numbers of the training frames, ascending
     """

@@ -41,7 +41,7 @@ class Variant:
         from each of them in turn, in place of the first ``frames``
     """
 
-    labels: dict[str, Any]  # first columns of its row in the table of times
+    labels: dict[str, Any]  # first columns of the variant's row in the table of times
     loop: Stepper
     start: State  # before the first frame
     frames: int

@@ -62,8 +62,8 @@ def atomic_path(path: str | os.PathLike[str], with_checksum: bool = True) -> Ite
             made = sums.new_checksum(sums.digest_of(temporary), target.name, target)
             checksum.write_bytes(made.content)
             _bring_to_disk(checksum)
-            # the checksum first: a process killed in between leaves no result without a checksum,
-            # but one that is missing or does not match it, which the next run makes again
+            # the checksum first: a process killed in between then leaves a result that is missing
+            # or does not match its checksum, and the next run makes it again
             os.replace(checksum, checksum_path(target))
         os.replace(temporary, target)
     except OSError as error:
@@ -78,7 +78,7 @@ def require_own(path: str | os.PathLike[str]) -> None:
     """Check, before a long computation of a result, that ``path`` can be written.
 
     Raises StorageError if it is not a regular file, if its folder cannot be made or written to, or
-    if it is a file that pdrom has not made: without an intact checksum and the text `MARK`.
+    if it was not made by pdrom: it has neither an intact checksum nor the text `MARK`.
     """
     target = Path(path)
     _require_file(target)
@@ -203,7 +203,7 @@ def write_hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
 
 
 class _Memory(io.BytesIO):
-    """File in memory for HDF5, which crashes when the process ends if a disk was full."""
+    """File in memory: HDF5 on a full disk would crash when the process ends."""
 
     def truncate(self, size: int | None = None) -> int:
         """Set the file's size; as on a disk, zeros fill a longer file."""
@@ -239,4 +239,4 @@ def require_self_contained(file: h5py.File, path: str | os.PathLike[str]) -> Non
         return None if inside else name
 
     if name := file.visititems_links(outside) or file.visititems(outside):
-        raise StorageError(f"{path}: {name} is no data of this file but leads elsewhere")
+        raise StorageError(f"{path}: {name} refers to data outside this file")

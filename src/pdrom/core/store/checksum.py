@@ -26,7 +26,7 @@ from pathlib import Path
 from pdrom.core.errors import StorageError, reason
 from pdrom.core.provenance import provenance
 
-# Whether a damaged result is renamed when read: inside the context `damaged_set_aside`.
+# Whether reading a damaged result renames it: True inside the context `damaged_set_aside`.
 _ASIDE: ContextVar[bool] = ContextVar("damaged results are set aside", default=False)
 sets_aside = _ASIDE.get
 
@@ -53,7 +53,7 @@ BLOCK = 2048  # bytes of the user block; HDF5 allows powers of two, at least 512
 _LINE = b"pdrom: BLAKE2b of the bytes behind the first 2048, and what made them\n"
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 BLOCK_NAME = "-"  # file name that `tail -c +2049 FILE | b2sum` prints for standard input
-UNCHECKED = "--unchecked (in Python unchecked=True) reads it if it is sound"
+UNCHECKED = "--unchecked (in Python unchecked=True) reads it if its data are valid"
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def require_intact(path: str | os.PathLike[str], unchecked: bool = False) -> Non
     """Refuse a result ``path`` that does not match its checksum; every reader calls this first.
 
     Raises StorageError if the file is missing, cannot be read, is damaged or (if not ``unchecked``)
-    has no checksum, or a job of the workflow (`damaged_set_aside`) reads another file than its own.
+    has no checksum, or if a job of the workflow (`damaged_set_aside`) reads another job's file.
     """
     path = Path(path)
     readable = path.is_file() and os.access(path, os.R_OK)
@@ -210,7 +210,7 @@ def _checksum_bytes(path: Path) -> bytes | None:
 
 
 def digest_told(path: str | os.PathLike[str]) -> str:
-    """Digest of the bytes of the result ``path`` as its checksum says; "" if none says one.
+    """Return the digest of the result ``path`` from its checksum; "" without a valid checksum.
 
     A job of the workflow refuses another result, as `require_intact` does.
     """
@@ -221,7 +221,7 @@ def digest_told(path: str | os.PathLike[str]) -> str:
 
 
 def move_aside(path: str | os.PathLike[str]) -> str:
-    """Rename ``path``, also a folder or link, to ``NAME.damaged``; return words that say so."""
+    """Rename ``path``, also a folder or link, to ``NAME.damaged``; return a message about it."""
     path = Path(path)
     aside, checksum = path.with_name(f"{path.name}.damaged"), checksum_path(path)
     try:
@@ -229,7 +229,7 @@ def move_aside(path: str | os.PathLike[str]) -> str:
         checksum.unlink(missing_ok=True)
     except OSError as error:
         return f"; delete it, it cannot be renamed ({reason(error)})"
-    return f"; set aside as {aside.name}"
+    return f"; renamed to {aside.name}"
 
 
 def _set_aside(path: Path, fault: str) -> StorageError:

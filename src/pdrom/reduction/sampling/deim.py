@@ -1,8 +1,8 @@
 """Interface of all rules that select samples; greedy discrete empirical interpolation (DEIM).
 
-DEIM (Chaturantabut and Sorensen 2010, algorithm 1) selects single entries or whole elements (all
-3p entries of an element of p rows). The preprint's variant selects whole rows of three entries
-(x, y, z), by the residual norm over the three axes.
+DEIM (Chaturantabut and Sorensen 2010, algorithm 1) selects single entries or elements (all 3p
+entries of an element of p rows). The preprint's variant selects rows of three entries (x, y, z), by
+the residual norm over the three axes.
 """
 
 from abc import ABC, abstractmethod
@@ -15,7 +15,7 @@ from pdrom.reduction.sampling.gappy_pod_e import oversample
 
 
 class Selection(ABC):
-    """A rule that selects blocks of rows of a basis: entries (blocks of one row) or whole elements.
+    """A rule that selects blocks of rows of a basis: entries (blocks of one row) or elements.
 
     Subclasses are listed by name in `pdrom.reduction.method`.
     """
@@ -43,7 +43,7 @@ def deim_entries(v: np.ndarray) -> np.ndarray:
     The entry where the residual v_k - V_{k-1} (P^T V_{k-1})^-1 P^T v_k, times the weights w of
     `tie_weights`, is largest follows the k - 1 earlier ones, which P^T selects. These are the
     pivots of an LU factorisation of diag(w) V with partial pivoting (Sorensen and Embree 2016,
-    section 3), which LAPACK does in blocks. The entries are distinct, also of dependent modes.
+    section 3), which LAPACK does in blocks. The entries are distinct, also for dependent modes.
     """
     n, r = v.shape
     weighted = np.multiply(v, tie_weights(n)[:, None], out=np.empty((n, r), order="F"))
@@ -57,8 +57,8 @@ def deim_entries(v: np.ndarray) -> np.ndarray:
 def tie_weights(n: int) -> np.ndarray:
     """Factors w (n,), falling from 1 to almost 1 - TIE, that break ties between n magnitudes.
 
-    In a symmetric motion residuals are equal up to round-off. Times the factors, the first of them
-    is largest: one d places later is selected only if it is larger by the fraction TIE d / n.
+    In a symmetric trajectory, residuals are equal up to rounding errors. Times the factors, the
+    first is largest: a residual d places later is selected only if larger by the part TIE d / n.
     """
     return 1.0 - TIE * np.arange(n) / n
 

@@ -17,11 +17,11 @@ ROUNDOFF = 1e-11
 def oversample(
     v: np.ndarray, size: int, elements: np.ndarray, count: int = 0, bound: float = np.inf
 ) -> np.ndarray:
-    """Extend ``elements`` to ``count`` elements, or more, until the gain is at most ``bound``.
+    """Extend ``elements`` to ``count`` or more, until the DEIM constant is at most ``bound``.
 
-    The gain || (P^T V)^+ ||_2 is the factor by which the elements' rows P^T V of the basis V can
-    amplify errors. With orthonormal columns the set of all elements has the gain 1, so that every
-    bound of at least 1 can be met. Return all elements if even these do not suffice.
+    The DEIM constant || (P^T V)^+ ||_2 is the factor by which the elements' rows P^T V of the basis
+    V can amplify errors. It is 1 for all elements and orthonormal columns, so that every bound of
+    at least 1 can be satisfied. Return all elements if even these do not suffice.
     SamplingError if an element is repeated or out of range.
 
     v : (size e, r) basis, ``size`` consecutive rows for each of the e elements
@@ -45,7 +45,7 @@ class _Growing:
     def __init__(self, v: np.ndarray, size: int, elements: np.ndarray) -> None:
         self._rows = np.ascontiguousarray(v)
         self._blocks = self._rows.reshape(-1, size, v.shape[1])
-        # products B B^T (a tenth of the memory of the rows B), for the bounds in `_growth_at_most`
+        # products B B^T (10 % of the memory of the rows B), for the bounds in `_growth_at_most`
         self._squares = self._blocks @ self._blocks.transpose(0, 2, 1)
         self._sizes = np.trace(self._squares, axis1=1, axis2=2)
         self.picked, self.total = [int(e) for e in elements], len(self._blocks)
@@ -58,7 +58,7 @@ class _Growing:
 
     @property
     def gain(self) -> float:
-        """Amplification of errors 1 / sigma_min(P^T V); inf if P^T V lacks full column rank."""
+        """DEIM constant 1 / sigma_min(P^T V); inf if P^T V lacks full column rank."""
         roundoff = len(self._gram) * np.finfo(float).eps * np.trace(self._gram)
         return 1.0 / np.sqrt(self._smallest) if self._smallest > roundoff else np.inf
 
@@ -83,8 +83,8 @@ class _Growing:
 
         Two upper bounds exclude most elements, so that their growth is not computed: |B u|^2, with
         the rows B of an element and the eigenvector u of the smallest eigenvalue, compared with the
-        growth of the element where it is largest; then `_growth_at_most` in the same way. If none
-        of the rest grows more than the first of these two elements, that one is returned.
+        growth of the element where it is largest; then `_growth_at_most` in the same way. If no
+        other element grows more than the first of these two elements, the first is returned.
         """
         products = (self._rows @ self._weakest).reshape(self.total, -1)
         strength = np.einsum("es,es->e", products, products)

@@ -1,4 +1,4 @@
-"""Greedy selection of single entries or whole elements by the largest residual of the next mode."""
+"""Greedy selection of single entries or elements by the largest residual of the next mode."""
 
 from collections.abc import Sequence
 

@@ -1,8 +1,8 @@
 """The reduced local step: projections p(y) in S^T W p(y) become mean + V c(y), with r modes V.
 
 S has the operators of all elements, W their weights. Compiled code computes the coefficients c from
-sampled entries of p(y), then the reconstruction ("lift"). A column of the lift adds that by one set
-of coefficients, of all axes x, y, z or of one, to one axis of the right-hand side."""
+sampled entries of p(y), then the reconstruction ("lift"). A column of the lift adds the
+reconstruction of one set of coefficients (for one axis or all) to one axis of the result."""
 
 from copy import copy
 from dataclasses import dataclass, replace
@@ -158,7 +158,7 @@ class ReducedLocalStep:
             self.local_kernel = LocalKernel(_accumulate, vertices, arrays, numbers)
 
     def for_run(self) -> Self:
-        """Return the step with memory of its own for all that a run writes, matrices shared."""
+        """Return a copy of the step with separate memory for all that a run writes."""
         own, memory = copy(self), ("packed", "coefficients", "seconds")
         changed = {name: np.zeros_like(getattr(self._lift, name)) for name in memory}
         own._take(self._group, replace(self._lift, **changed))

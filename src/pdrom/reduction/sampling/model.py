@@ -22,13 +22,13 @@ class ProjectionModel:
 
     @property
     def title(self) -> str:
-        """Group, method, number of modes and gain: by how much sampling can amplify errors."""
+        """Group, method, number of modes and DEIM constant, in words."""
         own = self.reduction
-        return f"{self.group}, {own.spec.title}, r = {own.r}, gain {own.gain:.3g}"
+        return f"{self.group}, {own.spec.title}, r = {own.r}, DEIM constant {own.gain:.3g}"
 
     @property
     def residual(self) -> None:
-        """None: no training equations are fitted."""
+        """None, as no training equations are fitted."""
 
     def elements_evaluated(self, scene: Scene) -> int:
         """Number of elements of ``scene`` whose projections an iteration evaluates."""
@@ -47,7 +47,7 @@ class ProjectionModel:
         return y
 
     def output(self) -> None:
-        """None: there are no positions to compute."""
+        """None, as the unknowns are the positions."""
 
     def store(self, file: h5py.Group) -> None:
         """Write the model to the HDF5 group ``file``."""

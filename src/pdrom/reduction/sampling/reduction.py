@@ -38,7 +38,7 @@ def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarra
 
 
 def _singular(diagonal: np.ndarray) -> bool:
-    """Whether the least entry of the ``diagonal`` of a triangular factor is round-off."""
+    """Whether the least entry of the ``diagonal`` of a triangular factor is a rounding error."""
     return bool(diagonal.min() <= np.finfo(float).eps * diagonal.max())
 
 
@@ -113,9 +113,9 @@ class Block:
 class Reduction:
     """Approximation of a group's projections by r modes, from sampled entries or from all of them.
 
-    An axis whose training data are round-off has zero coefficients and does not enter the gain (the
-    amplification of errors). If the system of any other axis is singular, the method fails: the
-    gain is inf and the reconstruction nan.
+    An axis whose training data are rounding errors has zero coefficients and does not enter the
+    DEIM constant `gain`. If the system of any other axis is singular, the method fails: `gain` is
+    inf and the reconstruction nan.
 
     v : (3 e p, r) modes
     elements : elements to evaluate, in the order of ``sampling.elements``
@@ -155,20 +155,20 @@ class Reduction:
 
     @property
     def gain(self) -> float:
-        """Amplification of errors || (P^T V)^+ ||_2, P^T V the sampled rows; inf if singular.
+        """DEIM constant || (P^T V)^+ ||_2 with the sampled rows P^T V; inf if these are singular.
 
         With several sets of coefficients it is the largest. For orthonormal V and distinct rows the
         reconstruction p^ of p satisfies || p - p^ || <= gain || (I - V V^T)(p - mean) ||
         (Chaturantabut and Sorensen 2010, lemma 3.2), also for separate axes. The Tikhonov solution
         is no projection: the factor in the bound is sqrt(1 + gain^2), and a bias is added. For rows
-        taken up to m times it is sqrt(m) gain. With mass weighting, in the norm of the masses, it
-        is || (P^T V)^+ P^T M^(-1/2) ||_2; the gain remains that of sampled values.
+        taken up to m times the factor is sqrt(m) gain. With mass weighting, in the norm of the
+        masses, it is || (P^T V)^+ P^T M^(-1/2) ||_2, but `gain` has no weights.
         """
         return self._norms[0]
 
     @property
     def condition(self) -> float:
-        """Condition number of sampled rows P^T V; the largest if axes have own coefficients."""
+        """Condition number of sampled rows P^T V; the largest of separate coefficients."""
         return self._norms[1]
 
     @property

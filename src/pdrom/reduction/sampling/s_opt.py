@@ -15,7 +15,7 @@ from pdrom.core.errors import SamplingError
 from pdrom.reduction.sampling.deim import GrowingFit, Selection
 
 # A unit column counts as dependent on others if its part orthogonal to them has a norm below this.
-# For a copy of a column, round-off gives up to 1e-15 sqrt(r).
+# For a copy of a column, rounding errors give up to 1e-15 sqrt(r).
 DEPENDENT = 1e-12
 
 
@@ -71,7 +71,7 @@ class _Sampled:
     """
 
     def __init__(self, v: np.ndarray, size: int, elements: Sequence[int] | np.ndarray = ()) -> None:
-        # the S-measure does not depend on the length of columns; unit length reduces round-off
+        # the S-measure does not depend on the length of columns; unit length reduces errors
         norms = np.linalg.norm(v, axis=0)
         if not norms.all():
             raise SamplingError(f"S-OPT: mode {int(np.argmin(norms)) + 1} is zero")
@@ -98,7 +98,7 @@ class _Sampled:
             solved = np.linalg.solve(shifted, z[:, :, None])[:, :, 0]
             modes, residual = mode + 1, q + np.maximum(np.einsum("es,es->e", z, solved), 0.0)
         possible = residual > DEPENDENT**2
-        # M = B G^-1 B^T (see the class) is semidefinite: log det(I + M) < 0 is round-off
+        # M = B G^-1 B^T (see the class) is semidefinite: log det(I + M) < 0 is a rounding error
         determinants = np.maximum(np.linalg.slogdet(shifted)[1], 0.0)
         columns = self._squares[self.picked, :modes].sum(axis=0) + self._squares[:, :modes]
         measure = np.full(self.total, -np.inf)

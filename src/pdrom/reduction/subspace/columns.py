@@ -2,8 +2,8 @@
 
 The free vertices have k modes and the affine columns 1, x, y, z of the rest shape, so that the
 space contains the rest shape and every rigid motion. Vertices that a boundary condition fixes at
-any time are divided into "atoms": sets that are fixed and released together. Each atom has its own
-columns: affine ones and POD modes of its motion after release. While an atom is fixed, its
+any time are divided into "atoms": sets that are fixed and released together. Each atom has separate
+columns: affine ones and POD modes of its displacements after release. While an atom is fixed, its
 coordinates are prescribed, so that pins and handles are exact; otherwise they are unknowns.
 """
 
@@ -18,9 +18,9 @@ from pdrom.reduction.basis import fix_signs, pod
 
 # A column is dropped if its part orthogonal to the earlier ones has at most this share of its norm.
 DEPENDENT = 1e-9
-# Relative error up to which POD modes represent the non-affine motion of vertices fixed together.
+# Relative error of POD modes for the non-affine displacements of vertices fixed together.
 OWN_MOTION = 1e-3
-# Motion smaller than this fraction of the positions counts as round-off.
+# Displacements below this fraction of the positions count as rounding errors.
 ROUNDOFF = 100.0 * np.finfo(float).eps
 
 
@@ -55,7 +55,7 @@ def displacement_modes(
     rest = weight * displacements
     rest = rest - affine @ (affine.T @ rest)
     modes, sigma = pod(rest)
-    # singular values up to ``noise`` are round-off, such as all those of an affine motion
+    # singular values up to ``noise`` are rounding errors, as are all those of affine displacements
     noise = ROUNDOFF * float(np.linalg.norm(weight[:, :, None] * trajectory.transpose(1, 0, 2)))
     useful = int(np.count_nonzero(sigma > max(DEPENDENT * sigma[0], noise)))
     return modes[:, : min(k, useful)] / weight
@@ -68,10 +68,10 @@ def build_columns(
     atoms: Sequence[np.ndarray],
     trajectory: np.ndarray | None,
 ) -> Columns:
-    """Build a subspace from ``modes`` (N, k) of the free vertices and own columns of each atom.
+    """Build a subspace from ``modes`` (N, k) of the free vertices and columns of each atom.
 
-    Each of ``atoms`` gets affine columns, and POD modes of the non-affine part of its motion in
-    ``trajectory`` (n, N, 3) m, up to the error `OWN_MOTION`; if that is None, its rows of
+    Each of ``atoms`` gets affine columns, and POD modes of its non-affine displacements in
+    ``trajectory`` (n, N, 3) m, up to the error `OWN_MOTION`; if ``trajectory`` is None, its rows of
     ``modes``. ``points`` (N, 3) m is the rest shape, ``masses`` (N,) are in kg.
     """
     n = len(points)
@@ -86,7 +86,7 @@ def build_columns(
     for (vertices, block), own in zip(blocks, ranges, strict=True):
         b[np.ix_(vertices, own)] = block
     count = modes.shape[1]
-    if trajectory is None:  # own columns may depend on each other or be affine
+    if trajectory is None:  # given columns may depend on each other or be affine
         affine = orthonormal(weight * affine_columns(points)[free_vertices])
         count = len(ranges[0]) - affine.shape[1]
     return Columns(b, ranges[0], list(atoms), ranges[1:], count)
@@ -113,7 +113,7 @@ def orthonormal(columns: np.ndarray) -> np.ndarray:
     for column in columns.T:
         norm = np.linalg.norm(column)
         rest = column.copy()
-        for _ in range(2):  # the second pass removes the first one's round-off (Kahan and Parlett)
+        for _ in range(2):  # the second pass removes errors of the first (Kahan and Parlett)
             for other in kept:
                 rest -= other * (other @ rest)
         if norm > 0.0 and np.linalg.norm(rest) > DEPENDENT * norm:

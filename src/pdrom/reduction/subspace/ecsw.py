@@ -13,7 +13,7 @@ factors satisfy sum_e xi_e g_e = sum_e g_e map z to the same z'. The factors are
 the pairs (z, z') of a run, by sparse non-negative least squares, stopped early. A
 residual r of the equations changes the next iterate by A^-1 r and raises the iteration's quadratic
 objective by 1/2 r^T A^-1 r above its minimum. Residuals are measured by this amount: in the
-Euclidean norm the stiff coordinates would hide errors of the soft ones, which determine the motion.
+Euclidean norm stiff coordinates would hide errors of soft ones, which determine the trajectory.
 """
 
 import logging
@@ -123,11 +123,11 @@ def _measure(space: ReducedSpace, fixed: np.ndarray) -> np.ndarray:
 # Training equations are added up at random (hashed) to SKETCH rows per coordinate of the subspace.
 # There must be several times more rows than selected elements, or their factors xi would overfit.
 SKETCH = 60
-# Samples are chosen among CANDIDATES elements, or up to MOST if a tolerance is missed: equations of
+# Samples are chosen among CANDIDATES elements, up to MOST if a tolerance is violated: equations of
 # all elements of a large mesh would not fit into memory, and neighbouring elements are similar.
 CANDIDATES, MOST = 10_000, 20_000
 BATCH = 8  # frames whose equations are hashed together
-ROUNDOFF = 10.0  # forces up to this multiple of the estimated round-off count as none
+ROUNDOFF = 10.0  # forces up to this multiple of their rounding errors count as none
 SEED = 0
 
 
@@ -141,9 +141,9 @@ def ecsw_elements(
     """Select elements and their factors xi > 0 for each tolerance.
 
     A tolerance bounds the relative residual of the training equations, which is computed without
-    hashing and stored with the samples; it is larger where even all candidates miss the tolerance.
+    hashing and stored with the samples. It is larger if even all candidates violate the tolerance.
     A group without any force in the training keeps all elements. In a large group, candidates are a
-    random (seeded) subset, which is doubled, up to `MOST`, until all tolerances are met. ``choose``
+    random (seeded) subset, which is doubled, up to `MOST`, until all tolerances hold. ``choose``
     replaces the search (see `Choose`).
     """
     count = CANDIDATES
@@ -178,7 +178,7 @@ def ecsw_elements(
 
 
 def _checked(chosen: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return what a `Choose` has ``chosen`` of ``count`` elements; SamplingError if unusable."""
+    """Return the result of a `Choose` for ``count`` elements; SamplingError if it is unusable."""
     try:
         at, factors = (np.asarray(part) for part in chosen)
         order = np.argsort(at, kind="stable")
@@ -225,7 +225,7 @@ def training_equations(
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray], bool]:
     """Return the matrix (m, len(elements)) and right-hand sides (m,) that the factors xi_e fit.
 
-    Return also the sums over all elements in each frame, and whether any force exceeds round-off.
+    Return also the sums over all elements in each frame, and whether forces exceed rounding errors.
 
     For each training iterate z, the next one z' and each coordinate, a row of the matrix has entry
     g_e, times `TrainingFrame.measure`. Right-hand sides are sums over all elements, scaled to norm
@@ -317,7 +317,7 @@ def _search(
             left = residual(*search.solution())
             if left <= tolerance or aim == 0.0:
                 break
-            # the fit of hashed equations is a little better than that of all
+            # the residual of the hashed equations is slightly smaller than that of all equations
             aim = min(aim, search.relative_residual) * max(0.5, min(0.9, tolerance / left))
         else:
             left = residual(*search.solution())
@@ -325,9 +325,9 @@ def _search(
         missed = found[tolerance][2] > tolerance > 0.0
         log.log(
             logging.WARNING if missed else logging.INFO,
-            "NNLS: %d columns, residual %.2e%s",
+            "sampling: %d elements, residual %.2e%s",
             len(found[tolerance][0]), found[tolerance][2],
-            f", which misses the tolerance {tolerance:g}" if missed else "",
+            f", which violates the tolerance {tolerance:g}" if missed else "",
         )  # fmt: skip
     return [found[tolerance] for tolerance in tolerances]
 
@@ -338,14 +338,14 @@ class _ActiveSet:
     In the active-set method of Lawson and Hanson, the column with the largest correlation with the
     residual is added, the least-squares problem of the active columns is solved, and columns whose
     values would be negative are removed. If many columns are active, several are added at a time,
-    to save passes over G, unless all of these were removed again the last time. The updated
+    to save passes over G, unless all columns added last were removed again. The updated
     Cholesky factor of the normal equations suffices for relative residuals down to about 1e-6.
     """
 
     def __init__(self, g: np.ndarray, b: np.ndarray, apart: int = 0) -> None:
         """Search with ``g`` (m, e), in Fortran order for speed, and ``b`` (m,).
 
-        The last ``apart`` rows have a relative residual of their own; the larger one counts.
+        The last ``apart`` rows have a separate relative residual; the larger residual counts.
         """
         self._g, self._b, self._size = g, b, float(np.linalg.norm(b))
         parts = slice(len(b) - apart), slice(len(b) - apart, None)
@@ -386,7 +386,7 @@ class _ActiveSet:
                 self._solve()
                 self._residual = self._b - self._columns[:, : len(self._active)] @ self._values
             staying = set(self._active).intersection(joined)
-            # exclude a column that `_add` or `_solve` rejected on its own: it would be chosen again
+            # exclude a column that `_add` or `_solve` rejected when it was added alone
             if len(block) == 1 and not staying:
                 self._banned[block] = True
             self._alone = not staying and len(block) > 1
@@ -409,7 +409,7 @@ class _ActiveSet:
         return first[np.argsort(-gradient[first], kind="stable")]
 
     def _add(self, column: int) -> bool:
-        """Make a column active if linearly independent of the active ones; return whether it is."""
+        """Activate a column if it is linearly independent of the active columns; return whether."""
         n, new = len(self._active), self._g[:, column] / self._norms[column]
         cross = self._forward(self._columns[:, :n].T @ new)
         rest = float(new @ new - cross @ cross)

@@ -26,11 +26,11 @@ from pdrom.reduction.subspace.ecsw import Samples
 from pdrom.reduction.subspace.model import Labelled, SubspaceModel
 from pdrom.reduction.subspace.space import PROBES, ReducedSpace, probe_vertices, reduced_state
 
-# Bases of more entries are exported in single precision, except rows of sampled or probe vertices.
+# Larger bases are exported in single precision, except rows of sampled and probe vertices.
 DOUBLES = 60_000
 MANIFOLDS = ("clamped", "length")
 LARGEST = 3_000_000  # largest size of a file for the page, bytes
-GHOST = 250_000  # the file has at most about so many vertex positions of the full-order run
+GHOST = 250_000  # approximate limit of vertex positions of the full-order run in the file
 FORMAT = 1
 
 

@@ -33,7 +33,7 @@ from pdrom.reduction.subspace.space import DenseElimination, ReducedSpace
 
 
 class FusedStepper(Stepper):
-    """Step loop with compiled, fused iterations, whose whole time counts as that of the local step.
+    """Step loop with compiled, fused iterations, whose time counts as that of the local step.
 
     It iterates like `Stepper` if a local step is no `SubspaceLocalStep` or lacks a gradient kernel.
     """

@@ -58,13 +58,13 @@ class SampledSpace:
     V: np.ndarray  # (e p, d) basis, orthonormal in the inner product of the weights W; for x, y, z
     elements: np.ndarray  # (m,) sampled elements, ascending
     operator: np.ndarray  # (d, m p) maps sampled projections to coefficients, by least squares in W
-    gain: float  # amplification of errors || (P^T W^(1/2) V)^+ ||_2, P^T selects the sampled rows
+    gain: float  # DEIM constant || (P^T W^(1/2) V)^+ ||_2; P^T selects the sampled rows
 
 
 def sampled_space(
     group: ConstraintGroup, points: np.ndarray, spec: HrpdSpec
 ) -> SampledSpace | None:
-    """Space of projections of ``group``; None if rest vectors S ``points`` are only round-off.
+    """Return the space of projections of ``group``; None if S ``points`` are rounding errors.
 
     ``points`` (N, 3) m is the rest shape. SamplingError if the samples do not determine the space.
     """

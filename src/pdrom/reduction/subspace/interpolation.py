@@ -26,7 +26,7 @@ class Interpolation:
     modes: np.ndarray  # B^T S^T W V, (K, r) for coefficients of each axis, (3 K, r) for shared ones
     offset: np.ndarray  # (K, 3) constant part of the right-hand side
     stiffness: np.ndarray  # (K, K) B^T S^T W S B of all elements
-    gain: float  # || operator ||_2, the largest factor by which errors of samples grow
+    gain: float  # DEIM constant || operator ||_2, by which errors of samples can grow
 
 
 class InterpolatedLocalStep:
@@ -75,7 +75,7 @@ def interpolation_of(
 ) -> Interpolation:
     """Convert a ``reduction`` of full-order projections to the subspace with the given ``columns``.
 
-    If each axis has its own coefficients, those of all axes are stacked.
+    If the axes have separate coefficients, these are stacked.
     """
     strain, stiffness = reduced_strain(group, columns)
     weighted = group.row_weights[:, None] * strain

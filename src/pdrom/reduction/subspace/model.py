@@ -87,8 +87,8 @@ class SubspaceModel:
 def reduced(
     labels: dict[str, Any], scene: Scene, model: SubspaceModel, count: int | None, newton: bool
 ) -> Setting:
-    """Setting with ``model`` of the mesh of ``scene`` and ``count`` iterations, local/global or
-    ``newton``; None: until a frame has converged."""
+    """Return a setting with ``model`` and ``count`` iterations per frame (None: until convergence),
+    local-global or ``newton``."""
     loop, start = model.loop(scene.iterated(count or ALL), newton)
     state = partial(reduced_state, scene, model.columns)
     return Setting(labels, loop, start, model.positions, model.output(), state)
@@ -152,8 +152,8 @@ def require_holds(scene: Scene, columns: spaces.Columns) -> None:
                 some = ", ".join(map(str, unit[:5])) + ", ..." * (len(unit) > 5)
                 held = boundary.side or f"the vertices [{some}]"
                 raise NotReducibleError(
-                    f"scene '{scene.config.name}', effect '{boundary.name}': holds {held}; the "
-                    "training neither held these nor declared them (hold=[...], --hold)"
+                    f"scene '{scene.config.name}', effect '{boundary.name}': holds {held}, but "
+                    "no training scene did; train again with hold=[...] (--hold)"
                 )
 
 

@@ -1,13 +1,13 @@
 """Newton's method for a frame in a position subspace: Hessian, Cholesky factor, L-BFGS.
 
-It minimises what local-global iterations minimise (free coordinates y, prediction s, d = S q):
+It minimises the objective of local-global iterations (free coordinates y, prediction s, d = S q):
 
     E(y) = 1/2 (y - s)^T (M/h^2) (y - s) + sum_i w_i/2 |d_i - p_i(d)|^2,    d = D y + d_0
 
-A step solves H x = grad E and halves x until E has decreased; if it does not, a local-global
-iteration, which never raises E, replaces the step. H is the system matrix, and after `FIRST` steps,
-every `RENEW` others or such a failure that minus D^T (w dp/dd) D (module `derivatives`), which
-takes as long as ten to thirty steps; L-BFGS updates H (Nocedal 1980). Vectors are sorted by axis.
+A step solves H x = grad E and halves x until E has decreased. If this fails, a local-global
+iteration, which never raises E, replaces the step. H is first the system matrix, then this minus
+D^T (w dp/dd) D (module `derivatives`, as slow as ten to thirty steps), renewed after `FIRST` steps,
+`RENEW` others or a failure. L-BFGS updates H (Nocedal 1980). Vectors are sorted by axis.
 """
 
 from typing import Any
@@ -27,8 +27,8 @@ from pdrom.reduction.subspace.products import blocks, objective, product, projec
 AXES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # in the order of `PAIRS`
 TALL, WIDE, CHUNK = 4, 8, 32  # entries summed in registers; elements whose rows fit in the cache
 RENEW, FIRST = 32, 16
-# A frame ends at a step (root mean square) of this part of the mesh, or of what this acceleration,
-# m/s^2, moves in a frame, if that is less. Relative round-off of an objective.
+# A frame has converged at a step (root mean square) of CONVERGED times the extent, or the distance
+# that UNNOTICED, m/s^2, moves in a frame if that is less; relative rounding error of an objective.
 CONVERGED, UNNOTICED, ROUNDOFF = 1e-6, 1e-2, 8.0 * np.finfo(float).eps
 
 
@@ -102,7 +102,7 @@ def factored_hessian(hessian, weights, sampled):
 
 @compiled(nogil=True)
 def run_newton(count, size, rows, operators, sampled, newton):
-    """Do up to ``count`` steps in place of `run_iterations`; end when no step helps any more."""
+    """Do up to ``count`` steps in place of `run_iterations`; end if none lowers the objective."""
     strain, lift, offset, constant, z, weights, mass, start = operators
     hessian, pull, inertia, (nothing, apart, moved, pushed, forces), enough, factor = newton
     d, p, y, before, n = sampled[5], sampled[6], z[: 3 * size], np.empty(3 * size), hessian[4]
@@ -117,7 +117,7 @@ def run_newton(count, size, rows, operators, sampled, newton):
         product(inertia, size, size, nothing, moved, pushed)
         product(pull, size, rows, pushed, apart, forces)
         if step == FIRST:
-            moved[: 3 * size] = start  # at s, elements are stretched: later, many have no stiffness
+            moved[: 3 * size] = start  # at s, elements are stretched; later many have no stiffness
             project(strain, rows, size, offset, moved, sampled)
         if step == FIRST or known == RENEW or failed:
             known, factor = 0, factored_hessian(hessian, weights, sampled)

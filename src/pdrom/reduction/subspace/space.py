@@ -76,7 +76,7 @@ def require_effects(scene: Scene) -> None:
         if not effect.in_subspace:
             raise NotReducibleError(
                 f"scene '{scene.config.name}', effect '{effect.name}': needs all vertices in every "
-                "frame, which a position subspace does not have; only group and method reduce it"
+                "frame, which a position subspace lacks; train with group and method instead"
             )
 
 

@@ -10,7 +10,7 @@ from pdrom.reduction.subspace import columns as spaces
 from pdrom.reduction.subspace.ecsw import Choose, ecsw_elements, training_run
 from pdrom.reduction.subspace.model import SubspaceModel
 
-# Elements are sampled on the iterates of this many frames, in equal shares of all training motions.
+# Elements are sampled on the iterates of this many frames, in equal shares of all training runs.
 FRAMES = 70
 
 
@@ -22,9 +22,9 @@ def make_columns(
     own: np.ndarray | None = None,
     hold: Sequence[np.ndarray] = (),
 ) -> spaces.Columns:
-    """Columns of a position subspace for all of ``scenes``; fewer if there are not so many modes.
+    """Build columns of a position subspace for ``scenes``; fewer if the data have fewer modes.
 
-    scenes : training scenes, on one mesh; what one of them holds has columns of its own
+    scenes : training scenes, on one mesh; vertices that they hold have separate columns
     training : (n, N, 3) m, positions in the training frames
     pod, skinning : numbers of POD modes and of skinning modes
     own : (N, k) columns instead of POD modes
@@ -56,7 +56,7 @@ def sampled_models(
     start: State | None = None,
     choose: Choose | None = None,
 ) -> list[SubspaceModel]:
-    """Models in ``columns`` with energy-conserving samples of every group, one per tolerance.
+    """Train a model in ``columns`` for each tolerance, with energy-conserving samples of groups.
 
     Training data are iterates of runs of ``scenes`` in the subspace, in equal shares of ``frames``.
     The first run begins at ``start``, in subspace coordinates, or (if None) at its initial state.

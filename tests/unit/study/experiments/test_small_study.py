@@ -368,7 +368,7 @@ def test_the_package_and_the_command_give_the_runs_of_the_study(at, array, table
     scene, out = str(config / "scenes" / f"{SCENE}.yaml"), str(tmp_path / "a.model.h5")
     asked = ["--group", GROUP, "--method", METHOD, "--r", "2", "--out", out]
     assert main.run(["train", scene, *asked]) == 0
-    assert f"gain {row.gain:.3g}, " in capsys.readouterr().out
+    assert f"DEIM constant {row.gain:.3g}, " in capsys.readouterr().out
     full_run, run = str(tmp_path / "full.h5"), str(tmp_path / "run.h5")
     assert main.run(["run", scene, "--out", full_run]) == 0
     assert main.run(["run", scene, "--model", out, "--compare", full_run, "--out", run]) == 0

@@ -153,7 +153,7 @@ def test_only_what_the_disk_lost_is_set_aside(tmp_path, monkeypatch, number, asi
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr("hashlib.file_digest", fail)
-    expected = "set aside" if aside else os.strerror(number)
+    expected = "renamed to" if aside else os.strerror(number)
     with damaged_set_aside(), pytest.raises(StorageError, match=expected):
         store.read_table(path)
     assert path.exists() != aside

@@ -262,7 +262,7 @@ def plain(tmp_path):
 
 def test_a_file_without_a_checksum_inside_is_refused_unless_asked_for(plain):
     assert store.check_file(plain) == "no checksum"
-    expected = r"old\.h5: no checksum inside .*; --unchecked \(.*\) reads it if it is sound$"
+    expected = r"old\.h5: no checksum inside .*; --unchecked \(.*\) reads it if its data are valid$"
     with pytest.raises(StorageError, match=expected), open_hdf5(plain):
         pass
     with open_hdf5(plain, unchecked=True) as file:
@@ -279,7 +279,7 @@ def test_an_error_while_reading_leads_to_another_check(tmp_path, damaged):
     path = tmp_path / "a.h5"
     with made_by("job", {}, "c0de"), store.write_hdf5(path) as file:
         file["x"] = 1
-    message = "set aside" if damaged else os.strerror(errno.ENOLCK)
+    message = "renamed to" if damaged else os.strerror(errno.ENOLCK)
     with damaged_set_aside(), pytest.raises(StorageError, match=message), open_hdf5(path):
         if damaged:
             os.truncate(path, 3000)
