@@ -9,13 +9,13 @@ from pathlib import Path
 
 
 def checkout() -> Path | None:
-    """Folder of the checkout that contains this package; None for an installed package."""
+    """Return the folder of the checkout with this package; None for an installed package."""
     source = Path(__file__).resolve().parents[2]
     inside = source.name == "src" and (source.parent / "config").is_dir()
     return source.parent if inside else None
 
 
 def config_file(name: str) -> Path:
-    """Path of the configuration file ``name``, in the checkout or else in the package."""
+    """Return the path of the configuration file ``name``, in the checkout or the package."""
     root = checkout() or Path(str(files("pdrom")))
     return root / "config" / name

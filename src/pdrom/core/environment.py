@@ -76,7 +76,7 @@ def settle() -> None:
 
 
 def core_type(system: str, machine: str, features: set[str]) -> str | None:
-    """OpenBLAS's name of kernels that a whole processor family supports; None to set no kernels.
+    """Return OpenBLAS's name of kernels for a whole processor family; None to set no kernels.
 
     On Linux, x86-64: Haswell (2013; also AMD's Zen) if the processor has its instructions, or else
     Nehalem, whose instructions NumPy requires anyway; ARM: the base architecture. None on other
@@ -90,7 +90,7 @@ def core_type(system: str, machine: str, features: set[str]) -> str | None:
 
 
 def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
-    """Environment variables that make Numba compile for a whole family of processors.
+    """Return environment variables that make Numba compile for a whole family of processors.
 
     Haswell if an x86-64 processor has the instruction sets `COMPILED_HASWELL`; on ARM the base
     architecture. Otherwise empty: Numba then compiles for the processor on which it runs.
@@ -103,13 +103,13 @@ def compiled_for(machine: str, features: set[str]) -> dict[str, str]:
 
 
 def processor_features(cpuinfo: str) -> set[str]:
-    """Flags that all processors in ``cpuinfo`` (text of /proc/cpuinfo) share; may be empty."""
+    """Return flags that all processors in ``cpuinfo`` (text of /proc/cpuinfo) share."""
     flags = re.findall(r"^\s*(?:flags|Features)\s*:(.*)", cpuinfo, re.MULTILINE)
     return set.intersection(*(set(line.split()) for line in flags)) if flags else set()
 
 
 def features_here() -> set[str]:
-    """Flags that all processors of this machine share; empty if /proc/cpuinfo cannot be read."""
+    """Return flags that all processors of this machine share; empty if they cannot be read."""
     try:
         return processor_features(CPUINFO.read_text(encoding="utf-8", errors="replace"))
     except OSError:

@@ -10,19 +10,19 @@ INTERRUPTED = 130  # exit status of a program that ends by Ctrl-C
 
 
 def choices(value: object, allowed: Iterable[object]) -> str:
-    """End of a message about an invalid ``value``: all ``allowed`` names and the closest one."""
+    """Return the end of a message about an invalid ``value``: ``allowed`` names and the closest."""
     names = [str(name) for name in allowed]
     return f" (allowed: {', '.join(names)}){suggestion(value, names)}"
 
 
 def suggestion(value: object, allowed: Iterable[str]) -> str:
-    """End of a message about an invalid ``value``: the closest ``allowed`` name, if any."""
+    """Return the end of a message about an invalid ``value``: the closest ``allowed`` name."""
     close = get_close_matches(str(value), list(dict.fromkeys(allowed)), n=1)
     return f", did you mean '{close[0]}'?" if close else ""
 
 
 def reason(error: OSError) -> str:
-    """Operating system's message for ``error``, even if HDF5 gives its number only in the text."""
+    """Return the system's message for ``error``, even if HDF5 gives its number only in the text."""
     hidden = re.search(r"errno = (\d+)", str(error))
     number = error.errno or (int(hidden[1]) if hidden else 0)
     return os.strerror(number) if number in errno.errorcode else " ".join(str(error).split())[:200]

@@ -37,7 +37,7 @@ class Machine(ConfigModel):
 
 
 def machine() -> Machine:
-    """Record of this machine and this process."""
+    """Describe this machine and this process."""
     kernels = loaded_kernels()
     return Machine(
         cpu=_cpu_model(), cores=os.cpu_count(), python=platform.python_version(),
@@ -48,7 +48,7 @@ def machine() -> Machine:
 
 
 def loaded_kernels() -> tuple[dict[str, Any], ...]:
-    """Linear algebra and threading libraries in this process, sorted by the name of their file.
+    """List linear algebra and threading libraries in this process, sorted by file name.
 
     ``kind`` is "blas" or "openmp"; ``architecture`` is the processor that the kernels are written
     for, None if the library does not tell.

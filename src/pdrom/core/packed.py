@@ -16,7 +16,7 @@ def pack_text(values: np.ndarray) -> str:
 
 
 def pack_array(values: np.ndarray, kind: str) -> dict[str, Any]:
-    """Dict for JSON: number type ``kind`` ("f8", "f4", "u4" or "u1"), shape, packed ``values``."""
+    """Pack ``values`` for JSON as numbers of ``kind`` ("f8", "f4", "u4" or "u1"), with shape."""
     shape, data = list(np.shape(values)), np.asarray(values).astype(f"<{kind}")
     return {"kind": kind, "shape": shape, "data": pack_text(data)}
 
@@ -41,7 +41,7 @@ def pack_positions(positions: np.ndarray) -> dict[str, Any]:
 
 
 def brief(record: Any) -> str:
-    """Text of the dataclass ``record``, for its repr; an array is shown by shape and type."""
+    """Describe the dataclass ``record`` for its repr; show an array by shape and type."""
     shown = []
     for field in fields(record):
         value = getattr(record, field.name)

@@ -35,7 +35,7 @@ _JOB: ContextVar[Mapping[str, str]] = ContextVar("job", default=MappingProxyType
 
 @contextmanager
 def made_by(name: str, configuration: Any, code: str = "", inputs: str = "") -> Iterator[None]:
-    """Context in which all files that are written record the job ``name`` (a rule or a function).
+    """Record the job ``name`` (a rule or a function) in all files written in this context.
 
     ``configuration`` are all its settings, hashed as JSON. In the workflow, ``code`` is the
     fingerprint of the code that the job runs, ``inputs`` a hash of the files that it reads.
@@ -53,7 +53,7 @@ def made_by(name: str, configuration: Any, code: str = "", inputs: str = "") -> 
 
 @cache
 def library_versions() -> dict[str, str]:
-    """Versions of the packages in `LIBRARIES`; "absent" for one that is not installed."""
+    """Return versions of the packages in `LIBRARIES`; "absent" for a package not installed."""
     found = dict.fromkeys(LIBRARIES, "absent")
     for name in LIBRARIES:
         with suppress(PackageNotFoundError):
@@ -62,7 +62,7 @@ def library_versions() -> dict[str, str]:
 
 
 def attributes() -> dict[str, str]:
-    """Attributes of an HDF5 file that the job writes: provenance, configuration, units (SI)."""
+    """Return attributes for the job's HDF5 files: provenance, configuration, units (SI)."""
     return {
         **{key: value for key, value in _JOB.get().items() if key != "inputs_sha256"},
         "pdrom_version": __version__,

@@ -153,7 +153,7 @@ def validate(model: type[M], data: Any, source: str) -> M:
 
 
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
-    """Message about the first fault that ``model`` found, as ``key = value: what is required``."""
+    """Describe the first fault that ``model`` found, as ``key = value: what is required``."""
     # a misspelt required key causes two faults, unknown and missing: "missing" helps less, so last
     fault = min(error.errors(), key=lambda fault: fault["type"] == "missing")
     location = fault["loc"]
@@ -178,7 +178,7 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def shown(value: Any, width: int) -> str:
-    """Text of ``value`` for a message, on one line and cut to ``width`` characters."""
+    """Format ``value`` for a message, on one line and cut to ``width`` characters."""
     try:
         return f"{value!r:.{width}}".replace("\n", " ")
     except Exception:  # Python does not print integers of more than 4300 digits
@@ -186,7 +186,7 @@ def shown(value: Any, width: int) -> str:
 
 
 def keys_of(model: type[BaseModel]) -> list[str]:
-    """Names of the keys that ``model`` accepts."""
+    """Return the names of the keys that ``model`` accepts."""
     return [field.alias or name for name, field in model.model_fields.items()]
 
 

@@ -232,7 +232,7 @@ def _mean_in_modes(
 
 
 def pod(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Left singular vectors and singular values of ``matrix`` (n, m), min(n, m) of each.
+    """Compute min(n, m) left singular vectors and singular values of ``matrix`` (n, m).
 
     A tall matrix is first reduced by a QR factorisation (Chan 1982), which is backward stable,
     unlike the eigenvalues of A^T A. Each vector's entry of largest magnitude is positive.
@@ -298,7 +298,7 @@ def _by_reflections(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 def numerical_rank(singular_values: np.ndarray, shape: tuple[int, int], roundoff: float) -> int:
-    """Number of ``singular_values`` (n,) of a matrix of ``shape`` that exceed two error levels.
+    """Count ``singular_values`` (n,) of a matrix of ``shape`` that exceed two error levels.
 
     The relative level max(shape) eps sigma_1 is the backward error of the SVD; the absolute level
     ``roundoff`` is the error of the data, which may be differences of cancelling terms.

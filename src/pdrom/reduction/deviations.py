@@ -127,7 +127,7 @@ class Yardstick:
         return {"extent_norm": norm, "rest_norm": size}
 
     def errors(self, positions: np.ndarray, end: int) -> tuple[float | None, float | None]:
-        """Position and deformation error of ``positions`` (F' + 1, N, 3) m before frame ``end``.
+        """Compute position and deformation error of ``positions`` (F' + 1, N, 3) m up to ``end``.
 
         Both are None if the run ended earlier.
         """
@@ -141,14 +141,14 @@ class Yardstick:
         )
 
     def differences(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Norms (F',) m of differences in position and shape; ``positions`` (F' + 1, N, 3) m."""
+        """Compute norms (F',) m of position and shape differences of ``positions`` in all frames."""
         blocks, masses = _blocks(positions, self.reference), self.scene.masses
         apart = [np.linalg.norm((q - p)[1:], axis=(1, 2)) for q, p in blocks]
         shapes = [metrics.shape_differences(q[1:], p[1:], masses) for q, p in blocks]
         return np.concatenate(apart), np.concatenate(shapes)
 
     def deviations(self, outcome: Rerun) -> dict[str, np.ndarray]:
-        """Deviations in each of the F' frames of the run ``outcome`` from the full-order run.
+        """Compute deviations of the run ``outcome`` from the full-order run in each of F' frames.
 
         ``difference``, ``shape_difference`` (without rigid motion), ``step_difference`` (of changes
         of the positions in a frame): (F',) m, norms of the differences of both runs, the first two
@@ -208,7 +208,7 @@ def errors_within(
 
 
 def error_within(difference: np.ndarray, displacement: np.ndarray, end: int) -> float | None:
-    """Relative error over the first ``end`` frames; None if the run has fewer or nothing moved.
+    """Compute the relative error over ``end`` frames; None if fewer ran or nothing moved.
 
     ``difference`` (F',) and ``displacement`` (F,) are norms as `metrics.trajectory_error` takes.
     """

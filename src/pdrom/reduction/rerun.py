@@ -74,12 +74,12 @@ def rerun(
 
 
 def displacement_norms(reference: np.ndarray) -> np.ndarray:
-    """Norms (F,) m of the displacements from ``reference[0]`` in the frames after it."""
+    """Compute norms (F,) m of the displacements from ``reference[0]`` in the frames after it."""
     return np.linalg.norm((reference[1:] - reference[0]).reshape(len(reference) - 1, -1), axis=1)
 
 
 def step_norms(positions: np.ndarray) -> np.ndarray:
-    """Norms (F,) m of the steps between successive frames of ``positions`` (F + 1, N, 3) m.
+    """Compute norms (F,) m of the steps between frames of ``positions`` (F + 1, N, 3) m.
 
     They equal the time step times norms of velocities. Differences of two runs may be given, too.
     """
@@ -87,5 +87,5 @@ def step_norms(positions: np.ndarray) -> np.ndarray:
 
 
 def mean_motion(reference: np.ndarray) -> float:
-    """Root mean square over frames, m, of the displacement norms of ``reference`` (F + 1, N, 3)."""
+    """Compute the root mean square, m, of displacement norms of ``reference`` (F + 1, N, 3)."""
     return float(np.sqrt(np.mean(displacement_norms(reference) ** 2)))

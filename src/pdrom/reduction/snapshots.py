@@ -16,23 +16,23 @@ SPLITS = ("train", "test", "heldout")
 
 
 def training_frames(frames: int, count: int) -> np.ndarray:
-    """Training frames (count,) int64: even frame numbers, spread evenly over ``frames`` frames."""
+    """Choose training frames (count,) int64: even numbers, spread evenly over ``frames``."""
     even = np.arange(0, frames, 2)
     return even[np.round(np.linspace(0, len(even) - 1, count)).astype(np.int64)]
 
 
 def test_frames(frames: int) -> np.ndarray:
-    """Test frames (n,) int64: all odd numbers among ``frames`` frames."""
+    """Return test frames (n,) int64: all odd numbers among ``frames`` frames."""
     return np.arange(1, frames, 2)
 
 
 def stored_frames(frames: int, count: int) -> np.ndarray:
-    """Numbers of the training and test frames of a run of ``frames`` frames, ascending."""
+    """Return the training and test frames of a run of ``frames`` frames, ascending."""
     return np.sort(np.concatenate([training_frames(frames, count), test_frames(frames)]))
 
 
 def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
-    """Lumped mass (e p,) kg of each operator row: e elements of p rows, vertex ``masses`` (N,) kg.
+    """Compute the lumped mass (e p,) kg of each operator row from vertex ``masses`` (N,) kg.
 
     Every vertex divides its mass equally among the elements that contain it; each row has the mass
     of its element.
@@ -44,7 +44,7 @@ def row_masses(group: ConstraintGroup, masses: np.ndarray) -> np.ndarray:
 
 
 def touched_vertices(group: ConstraintGroup) -> sparse.csr_array:
-    """Matrix (e, N): 1 where the operator of an element of ``group`` uses a vertex, else 0."""
+    """Return a matrix (e, N): 1 where the operator of an element uses a vertex, else 0."""
     rows = group.rows_per_element
     touches = (group.S != 0).astype(np.float64)
     return (sum(touches[row::rows] for row in range(rows)) != 0).astype(np.float64)

@@ -79,7 +79,7 @@ def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict
 def measure_calls(
     calls: Mapping[Hashable, Callable[[], object]], warmup: int, repeats: int
 ) -> dict[Hashable, float]:
-    """Median time (ms) of each of ``calls``, in turn, after ``warmup`` untimed calls of each."""
+    """Return the median time (ms) of each of ``calls``, in turn, after ``warmup`` calls of each."""
     samples: dict[Hashable, list[float]] = {key: [] for key in calls}
     for _ in range(warmup + repeats):
         for key, call in calls.items():
@@ -119,7 +119,7 @@ def _time_once(variant: Variant, frames: int) -> np.ndarray:
 
 
 def median_frames(samples: np.ndarray) -> np.ndarray:
-    """Mean time (phases,) over frames of ``samples`` (repeats, frames, phases).
+    """Compute the mean time (phases,) over frames of ``samples`` (repeats, frames, phases).
 
     Times of a frame are those of the repeat with the median total (the first phase).
     """

@@ -39,7 +39,7 @@ class Window(NamedTuple):
         return (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
 
     def resized(self, width: float, height: float) -> "Window":
-        """Window with the same centre and the given ``width`` and ``height``, m."""
+        """Return a window with the same centre and the given ``width`` and ``height``, m."""
         x, y = 0.5 * (self.left + self.right), 0.5 * (self.bottom + self.top)
         return Window(x - 0.5 * width, x + 0.5 * width, y - 0.5 * height, y + 0.5 * height)
 
@@ -66,28 +66,28 @@ class Camera:
         return np.stack([right, np.cross(eye, right), eye]) @ rotation_to(np.array(self.up)).T
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Picture coordinates (n, 2), m, of points (n, 3)."""
+        """Return picture coordinates (n, 2), m, of points (n, 3)."""
         return points @ self.basis[:2].T
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """Coordinate (n,) m of ``points`` (n, 3) m towards the eye; larger is nearer to it."""
+        """Return the coordinate (n,) m of ``points`` (n, 3) m towards the eye; larger is nearer."""
         return points @ self.basis[2]
 
 
 def bounds(flat: np.ndarray, margin: float = 0.08) -> Window:
-    """Bounding window of points ``flat`` (n, 2) m, widened by ``margin`` times its longer side."""
+    """Return a window of points ``flat`` (n, 2) m, widened by ``margin`` times its length."""
     low, high = flat.min(axis=0), flat.max(axis=0)
     pad = margin * max(float((high - low).max()), 1e-12)
     return Window(low[0] - pad, high[0] + pad, low[1] - pad, high[1] + pad)
 
 
 def window_of(camera: Camera, clouds: Iterable[np.ndarray], margin: float = 0.08) -> Window:
-    """Window of all points in ``clouds`` (n, 3) m, widened by ``margin`` times its longer side."""
+    """Return the window of all points in ``clouds`` (n, 3) m, widened as in `bounds`."""
     return bounds(np.concatenate([camera.project(cloud) for cloud in clouds]), margin)
 
 
 def up_of(effects: Sequence[EffectConfig]) -> np.ndarray:
-    """Unit vector (3,) opposite to the gravity in a scene's ``effects``; y without gravity."""
+    """Return the unit vector (3,) opposite to the gravity in ``effects``; y without gravity."""
     pulls = [np.array(e.acceleration) for e in effects if isinstance(e, Gravity.Config)]
     pull = sum(pulls, 0.0 * Y)
     strength = float(np.linalg.norm(pull))
@@ -95,7 +95,7 @@ def up_of(effects: Sequence[EffectConfig]) -> np.ndarray:
 
 
 def rotation_to(up: np.ndarray) -> np.ndarray:
-    """Smallest rotation (3, 3) that takes y to the unit vector ``up``; about x if ``up`` is -y."""
+    """Return the least rotation (3, 3) that takes y to the unit vector ``up``; about x for -y."""
     cosine = float(up @ Y)
     if cosine <= -1.0 + 1e-12:
         return np.diag([1.0, -1.0, -1.0])
@@ -111,7 +111,7 @@ def rotation_to(up: np.ndarray) -> np.ndarray:
 def shown_region(
     positions: np.ndarray, effects: Sequence[EffectConfig]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Low and high corner, m, of a cube with a margin around ``positions`` (F, N, 3) m of a run.
+    """Return two corners, m, of a cube with a margin around ``positions`` (F, N, 3) m of a run.
 
     An obstacle among the ``effects`` that reaches into the margin is inside the cube as a whole,
     unless it is larger than the run. Parts of runs and obstacles outside the cube are not shown.
@@ -130,7 +130,7 @@ def shown_region(
 
 
 def obstacles(positions: np.ndarray, effects: Sequence[EffectConfig]) -> list[Mesh]:
-    """Surfaces of obstacles in the `shown_region` of a run, the largest first, drawn behind."""
+    """List surfaces of obstacles in the `shown_region` of a run, the largest (hindmost) first."""
     region = shown_region(positions, effects)
     found = [body for effect in effects if (body := effect.body(*region))]
     return sorted(found, key=lambda body: -float(np.ptp(body.points, axis=0).max()))

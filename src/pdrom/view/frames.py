@@ -25,7 +25,7 @@ LABEL = 24  # characters of a line in the label of a row
 
 
 def frame_numbers(fractions: tuple[float, ...], frames: int) -> list[int]:
-    """Indices of frames (0 to ``frames``) at ``fractions`` of a run, without repetition."""
+    """Return indices of frames (0 to ``frames``) at ``fractions`` of a run, without repetition."""
     return list(dict.fromkeys(round(fraction * frames) for fraction in fractions))
 
 
@@ -107,7 +107,7 @@ def vtk(scene: ViewedScene, collection: Path) -> None:
 
 
 def point_data(scene: ViewedScene, frame: int) -> dict[str, np.ndarray]:
-    """Data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
+    """Return data of each vertex of ``scene`` in a ``frame``, (N, 3) float32 each.
 
     Displacement from the initial state (m) of the full-order run; for each reduced run its
     positions minus those of the full-order run (m), NaN after the reduced run's end.

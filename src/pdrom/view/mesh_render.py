@@ -23,13 +23,13 @@ Colour = str | tuple[float, float, float]
 
 
 def face_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (T, 3) of ``triangles`` (T, 3) of ``points`` (N, 3); zero for zero area."""
+    """Return unit normals (T, 3) of ``triangles`` of ``points`` (N, 3); zero for zero area."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     return _unit(np.cross(b - a, c - a))
 
 
 def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (T, 3) like those of `face_normals`, but averaged over neighbouring faces."""
+    """Return unit normals (T, 3) as `face_normals`, but averaged over neighbouring faces."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     weighted = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     vertex = np.zeros_like(points, dtype=float)
@@ -38,7 +38,7 @@ def smooth_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def shade(normals: np.ndarray, camera: Camera) -> np.ndarray:
-    """Brightness (T,), in [AMBIENT, 1], of both sides of faces with unit ``normals`` (T, 3)."""
+    """Return the brightness (T,), in [AMBIENT, 1], of faces with unit ``normals`` (T, 3)."""
     view = normals @ camera.basis.T
     lit = np.zeros(len(normals))
     for direction, strength in LIGHTS:
@@ -108,7 +108,7 @@ def draw_floor(ax: Axes, points: np.ndarray, mesh: Mesh, camera: Camera, window:
 def outline_edges(
     rest: np.ndarray, points: np.ndarray, triangles: np.ndarray, camera: Camera
 ) -> np.ndarray:
-    """Edges (n, 2) on the boundary of the surface, or between faces that meet sharply at rest.
+    """Return edges (n, 2) on the surface's boundary, or between faces that meet sharply at rest.
 
     A round body has no such edges: its silhouette edges are returned, between a face turned to the
     ``camera`` and one turned away. ``rest`` and ``points`` are (N, 3) m, ``triangles`` (T, 3).

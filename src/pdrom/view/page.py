@@ -80,7 +80,7 @@ def require_page(path: str | os.PathLike[str]) -> None:
 
 
 def page_of(parts: Sequence[str], scenes: Sequence[Mapping[str, Any]]) -> str:
-    """Text of the page of ``parts`` (`VIEWER`, `LIVE`) with ``scenes``, the data of its script.
+    """Return the page of ``parts`` (`VIEWER`, `LIVE`) with ``scenes``, the data of its script.
 
     An entry of `LIVE` has a ``scene``'s name and its ``content``, or a ``file`` next to the page
     with the content. StorageError if the page has more than `LARGEST` bytes.
@@ -95,7 +95,7 @@ def page_of(parts: Sequence[str], scenes: Sequence[Mapping[str, Any]]) -> str:
 
 
 def safe_json(value: object) -> str:
-    """JSON of ``value``, escaped so that no text can end the script element or open a comment."""
+    """Return ``value`` as JSON in which no text can end the script element or open a comment."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
@@ -109,7 +109,7 @@ FRAMES = 75  # largest number of frames of a run on the page; the others are ski
 
 
 def pack_scene(scene: ViewedScene) -> dict[str, Any]:
-    """JSON data of ``scene`` for the page, without vertices that belong to no surface triangle."""
+    """Return JSON data of ``scene`` for the page, without vertices inside the body."""
     used, triangles = np.unique(scene.mesh.triangles, return_inverse=True)
     stride = max(1, ceil((len(scene.positions) - 1) / FRAMES))
     full = scene.positions[::stride, used]
@@ -134,7 +134,7 @@ def pack_scene(scene: ViewedScene) -> dict[str, Any]:
 
 
 def view_of(effects: Sequence[EffectConfig]) -> dict[str, list[float]]:
-    """Directions ``up`` and to the ``eye`` of a page of a scene with these ``effects``."""
+    """Return directions ``up`` and to the ``eye`` for a page of a scene with these ``effects``."""
     up = up_of(effects)
     return {"up": up.tolist(), "eye": (rotation_to(up) @ EYE).tolist()}
 

@@ -60,7 +60,7 @@ class RunPanel:
 def shared_window(
     camera: Camera, reference: np.ndarray, panels: list[RunPanel], margin: float = 0.1
 ) -> Window:
-    """Window for ``reference`` (N, 3) m and unfailed runs up to `SAME_SCALE` times as large."""
+    """Return a window for ``reference`` (N, 3) m and runs up to `SAME_SCALE` times as large."""
     base = window_of(camera, [reference], margin)
     size = SAME_SCALE * max(base.width, base.height)
     clouds = [reference]
@@ -177,7 +177,7 @@ class Row:
 
 
 def draw_rows(rows: list[Row], height_limit: float = HEIGHT_LIMIT, footer: float = 0.0) -> Figure:
-    """Figure of ``rows``, up to ``height_limit`` inches high, with ``footer`` inches left free."""
+    """Draw ``rows`` in a figure up to ``height_limit`` inches high, ``footer`` inches left free."""
     columns = max(len(row.panels) for row in rows)
     width = (style.WIDTH - LEFT) / columns
     texts = footer + sum(ABOVE + BELOW + LINE * row.lines for row in rows)

@@ -39,7 +39,7 @@ RC: dict[str, Any] = {
 
 @contextmanager
 def look() -> Iterator[None]:
-    """Context with this style over matplotlib's defaults; the user's settings are ignored."""
+    """Apply this style to matplotlib's defaults in a context; the user's settings are ignored."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -49,7 +49,7 @@ def look() -> Iterator[None]:
 
 
 def surface_colour(colour: str) -> tuple[float, float, float]:
-    """RGB of ``colour``, lightened for a shaded surface so that shadows stay visible."""
+    """Return RGB of ``colour``, lightened for a shaded surface so that shadows stay visible."""
     from matplotlib.colors import to_rgb
 
     red, green, blue = (0.72 * c + 0.28 for c in to_rgb(colour))
@@ -67,7 +67,7 @@ def plain_words(text: str) -> str:
 
 
 def new_figure(height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
-    """An empty figure of the manuscript's width, ``height`` inches high, with a ``layout``."""
+    """Make an empty figure of the manuscript's width, ``height`` inches high, with a ``layout``."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
     from matplotlib.transforms import Bbox
@@ -92,21 +92,21 @@ def new_figure(height: float, layout: Literal["constrained"] | None = "constrain
 
 
 def handle(label: str, **look: Any) -> Line2D:
-    """Entry ``label`` of a legend: a line, or a marker, with this ``look``."""
+    """Make the entry ``label`` of a legend: a line, or a marker, with this ``look``."""
     from matplotlib.lines import Line2D
 
     return Line2D([], [], label=label, **look)
 
 
 def patch(label: str, **look: Any) -> Patch:
-    """Entry ``label`` of a legend: a rectangle with this ``look``."""
+    """Make the entry ``label`` of a legend: a rectangle with this ``look``."""
     from matplotlib.patches import Patch
 
     return Patch(label=label, **look)
 
 
 def handles(looks: Mapping[str, tuple[str, str]], **common: Any) -> list[Line2D]:
-    """Legend entries from ``looks``: label -> (colour, marker), and looks ``common`` to all."""
+    """Make legend entries from ``looks`` (label -> (colour, marker)) and ``common`` looks."""
     return [handle(label, color=c, marker=m, **common) for label, (c, m) in looks.items()]
 
 

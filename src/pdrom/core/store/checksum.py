@@ -33,7 +33,7 @@ sets_aside = _ASIDE.get
 
 @contextmanager
 def damaged_set_aside() -> Iterator[None]:
-    """Context in which an attempt to read a damaged result renames it to ``NAME.damaged``.
+    """Rename a damaged result to ``NAME.damaged`` when it is read in this context.
 
     It also renames a result whose checksum names another path, such as that of another scene.
     Only jobs of the workflow use it: the next run makes the missing result again. Other readers
@@ -88,24 +88,24 @@ class Checksum:
 
 
 def checksum_path(path: str | os.PathLike[str]) -> Path:
-    """Path of the checksum file of ``path``, for files without a checksum inside."""
+    """Return the path of the checksum file of ``path``, for files without a checksum inside."""
     return Path(path).with_name(f".{Path(path).name}{CHECKSUM_SUFFIX}")
 
 
 def digest_of(path: Path, start: int = 0) -> str:
-    """BLAKE2b digest of the bytes of the file ``path`` from ``start`` on, hexadecimal."""
+    """Compute the hexadecimal BLAKE2b digest of the bytes of ``path`` from ``start`` on."""
     with open(path, "rb") as handle:
         handle.seek(start)
         return hashlib.file_digest(handle, "blake2b").hexdigest()
 
 
 def new_checksum(digest: str, name: str, path: str | os.PathLike[str] = "") -> Checksum:
-    """Checksum ``name`` of the file ``path``: the ``digest`` of its bytes, current provenance."""
+    """Make the checksum ``name`` of ``path``: ``digest`` of its bytes, current provenance."""
     return Checksum(digest, name, json.dumps(provenance(path), sort_keys=True))
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether ``path`` has a suffix or the signature of HDF5, or begins with pdrom's checksum."""
+    """Tell whether ``path`` has a suffix or signature of HDF5, or begins with pdrom's checksum."""
     with open(path, "rb") as handle:
         head = handle.read(BLOCK + len(_SIGNATURE))
     named = path.suffix in SUFFIXES or head.startswith((_SIGNATURE, _LINE))
@@ -141,7 +141,7 @@ def read_checksum(path: str | os.PathLike[str]) -> Checksum | None:
 
 
 def provenance_of(path: str | os.PathLike[str]) -> dict[str, str]:
-    """Provenance of the file ``path`` from its checksum; empty without a valid checksum."""
+    """Return the provenance of ``path`` from its checksum; empty without a valid checksum."""
     checksum = read_checksum(path)
     return json.loads(checksum.provenance) if checksum and checksum.provenance else {}
 

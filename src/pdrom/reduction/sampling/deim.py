@@ -38,7 +38,7 @@ TIE = 1e-6
 
 
 def deim_entries(v: np.ndarray) -> np.ndarray:
-    """Greedy DEIM entries of the basis ``v`` (n, r): min(n, r) indices, the first k for k modes.
+    """Select min(n, r) DEIM entries of the basis ``v`` (n, r); k modes use the first k.
 
     The entry where the residual v_k - V_{k-1} (P^T V_{k-1})^-1 P^T v_k, times the weights w of
     `tie_weights`, is largest follows the k - 1 earlier ones, which P^T selects. These are the
@@ -55,7 +55,7 @@ def deim_entries(v: np.ndarray) -> np.ndarray:
 
 
 def tie_weights(n: int) -> np.ndarray:
-    """Factors w (n,), falling from 1 to almost 1 - TIE, that break ties between n magnitudes.
+    """Return factors (n,), falling from 1 to almost 1 - TIE, that break ties of n magnitudes.
 
     In a symmetric trajectory, residuals are equal up to rounding errors. Times the factors, the
     first is largest: a residual d places later is selected only if larger by the part TIE d / n.
@@ -83,7 +83,7 @@ class GrowingFit:
         self._factor = linalg.lapack.dtpqrt(0, block, self._factor, rows, overwrite_a=True)[0]
 
     def triangle(self, k: int) -> np.ndarray:
-        """Factor R (k, k) of the first k modes; R^T R is the Gram matrix of their sampled rows."""
+        """Return the factor R (k, k) of k modes; R^T R is the Gram matrix of their sampled rows."""
         return self._factor[:k, :k]
 
     def coefficients(self, k: int) -> np.ndarray:
@@ -95,7 +95,7 @@ class GrowingFit:
 
 
 def block_elements(v: np.ndarray, size: int) -> np.ndarray:
-    """Indices of min(e, r) elements of a basis ``v`` (size e, r) by DEIM; k modes use the first k.
+    """Select min(e, r) elements of a basis ``v`` (size e, r) by DEIM; k modes use the first k.
 
     Each of the e elements has ``size`` rows. Mode k is fitted by the earlier modes on the rows of
     the elements selected so far; the element with the largest residual norm is selected next.
@@ -105,7 +105,7 @@ def block_elements(v: np.ndarray, size: int) -> np.ndarray:
 
 
 def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndarray:
-    """Greedy indices (r,) of rows (x, y, z) of a basis ``v`` (3 rows, r), the first k for k modes.
+    """Select rows (x, y, z) of a basis ``v`` (3 rows, r) for r modes; k modes use the first k.
 
     For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}, where P^T selects rows.
     An axis without modes, False in ``active``, is left out. The row with the largest sum of squared

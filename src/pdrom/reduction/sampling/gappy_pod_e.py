@@ -118,7 +118,7 @@ class _Growing:
 def eigenvalue_growth(
     blocks: np.ndarray, products: np.ndarray, weakest: np.ndarray, gap: float
 ) -> np.ndarray:
-    """Lower bounds on how much B^T B raises the smallest eigenvalue of a symmetric matrix, (m,).
+    """Bound from below how much B^T B raises the least eigenvalue of a symmetric matrix, (m,).
 
     For u the eigenvector of the smallest eigenvalue, g the gap to the next one and b = B u,
 

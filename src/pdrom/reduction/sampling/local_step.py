@@ -177,7 +177,7 @@ class ReducedLocalStep:
         return float("nan")
 
     def sample(self, y: np.ndarray) -> np.ndarray:
-        """Projections of the sampled elements at ``y`` (N, 3) m, as one vector."""
+        """Compute projections of the sampled elements at ``y`` (N, 3) m, as one vector."""
         return self._group.project_elements(y, self._elements).ravel()
 
     def solve(self, sampled: np.ndarray) -> None:
@@ -235,6 +235,6 @@ def _lift(group: ConstraintGroup, reduction: Reduction) -> Lift:
 
 
 def replace_group(scene: Scene, group: str, replacement: LocalStep) -> list[LocalStep]:
-    """Local steps of ``scene``, with ``replacement`` for the constraint group named ``group``."""
+    """Return local steps of ``scene``, with ``replacement`` for the constraint ``group``."""
     scene.group(group)
     return [replacement if g.name == group else g for g in scene.groups]

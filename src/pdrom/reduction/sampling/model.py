@@ -31,23 +31,23 @@ class ProjectionModel:
         """None, as no training equations are fitted."""
 
     def elements_evaluated(self, scene: Scene) -> int:
-        """Number of elements of ``scene`` whose projections an iteration evaluates."""
+        """Count the elements of ``scene`` whose projections an iteration evaluates."""
         others = sum(group.elements for group in scene.groups if group.name != self.group)
         return others + len(self.reduction.elements)
 
     def loop(self, scene: Scene) -> tuple[Stepper, State]:
-        """Step loop of ``scene`` with the group reduced, and the initial state."""
+        """Return the step loop of ``scene`` with the group reduced, and the initial state."""
         step = ReducedLocalStep(scene.group(self.group), self.reduction)
         steps = replace_group(scene, self.group, step)
         loop = scene.stepper(local_steps=steps, track_objective=False)
         return loop, scene.initial_state()
 
     def positions(self, y: np.ndarray) -> np.ndarray:
-        """Vertex positions (N, 3) m: the unknowns ``y`` themselves."""
+        """Return vertex positions (N, 3) m, which are the unknowns ``y``."""
         return y
 
     def output(self) -> None:
-        """None, as the unknowns are the positions."""
+        """Return None, as the unknowns are the positions."""
 
     def store(self, file: h5py.Group) -> None:
         """Write the model to the HDF5 group ``file``."""

@@ -13,7 +13,7 @@ ROWS_A_MODE, FEW = 2, 8
 
 
 def qdeim_elements(v: np.ndarray, size: int) -> np.ndarray:
-    """Q-DEIM elements of the basis ``v`` (size e, r): min(e, r) indices.
+    """Select min(e, r) elements of the basis ``v`` (size e, r) by Q-DEIM.
 
     Pivots are chosen among the columns of V^T, in groups of the ``size`` columns of an element.
     The group with the largest Frobenius norm (times `tie_weights`) is selected, and the direction

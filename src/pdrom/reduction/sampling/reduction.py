@@ -15,7 +15,7 @@ from pdrom.reduction.sampling.gappy_pod_e import oversample
 
 
 def solution_operator(a: np.ndarray, solve: Solve, tikhonov: float) -> np.ndarray:
-    """Matrix (r, m) that maps m sampled values b to coefficients c with A c = b, A = ``a`` (m, r).
+    """Compute the matrix (r, m) that maps samples b (m,) to coefficients c with A c = b, A = ``a``.
 
     square : A^-1; nan, so that a run blows up, if A is singular to working precision or not square
     qr : least squares A^+ by a QR factorisation; nan if A has not full column rank
@@ -43,7 +43,7 @@ def _singular(diagonal: np.ndarray) -> bool:
 
 
 def norm_and_condition(a: np.ndarray, operator: np.ndarray) -> tuple[float, float]:
-    """2-norm of ``operator`` and condition number of ``a`` (m, r); inf if ``a`` is singular."""
+    """Compute the 2-norm of ``operator`` and the condition of ``a`` (m, r); inf if singular."""
     if not np.isfinite(operator).all():
         return np.inf, np.inf
     sigma = linalg.svdvals(a, check_finite=False)
@@ -67,7 +67,7 @@ class Sampling:
     def of_entries(
         cls, entries: np.ndarray, rows_per_element: int, elements: int, repeats: bool = False
     ) -> "Sampling":
-        """Sampling of ``entries`` (m,) of a vectorised projection of all ``elements``.
+        """Sample ``entries`` (m,) of a vectorised projection of all ``elements``.
 
         SamplingError if an entry is out of range, or occurs twice without ``repeats``.
         """
@@ -85,13 +85,13 @@ class Sampling:
 
     @classmethod
     def of_elements(cls, elements: np.ndarray, rows_per_element: int, total: int) -> "Sampling":
-        """Sampling of all 3p entries of ``elements`` (m,) of ``total`` elements of p rows."""
+        """Sample all 3p entries of ``elements`` (m,) of ``total`` elements of p rows."""
         entries = element_rows(np.asarray(elements, dtype=np.int64), 3 * rows_per_element)
         return cls.of_entries(entries, rows_per_element, total)
 
 
 def element_rows(elements: np.ndarray, size: int) -> np.ndarray:
-    """Indices (m size,) of all rows of ``elements`` (m,), which have ``size`` rows each."""
+    """Return indices (m size,) of all rows of ``elements`` (m,), of ``size`` rows each."""
     return (elements[:, None] * size + np.arange(size)).ravel()
 
 

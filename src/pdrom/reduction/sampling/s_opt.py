@@ -20,7 +20,7 @@ DEPENDENT = 1e-12
 
 
 def s_opt_path(v: np.ndarray, size: int) -> np.ndarray:
-    """Elements for which S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r) is largest, by greedy steps.
+    """Select elements for which S(A) = (sqrt(det A^T A) / prod_j |A_j|)^(1/r) is largest, greedily.
 
     Return min(e, r) indices, the first k for k modes. In step k, A is the first k modes at k
     elements. In the first step S is 1 for every element; this step selects the element with the
@@ -87,7 +87,7 @@ class _Sampled:
             self._products = self._blocks @ self._inverse() @ self._blocks.transpose(0, 2, 1)
 
     def best(self, mode: int | None = None) -> int:
-        """First element with which the sampled rows of the modes used so far, and of ``mode``, have
+        """Return the element with which the sampled rows of all modes so far, and of ``mode``, have
         the largest S-measure; SamplingError if the modes are dependent whichever is added."""
         if not self.picked and mode is not None:
             return int(np.argmax(self._squares[:, mode]))

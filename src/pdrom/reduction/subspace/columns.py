@@ -36,14 +36,14 @@ class Columns:
 
 
 def affine_columns(points: np.ndarray) -> np.ndarray:
-    """Columns 1, x, y, z, (N, 4), of the rest shape ``points`` (N, 3) m."""
+    """Return columns 1, x, y, z, (N, 4), of the rest shape ``points`` (N, 3) m."""
     return np.column_stack([np.ones(len(points)), points])
 
 
 def displacement_modes(
     trajectory: np.ndarray, points: np.ndarray, masses: np.ndarray, k: int
 ) -> np.ndarray:
-    """First k mass-weighted POD modes (N, k) of displacements minus their affine part.
+    """Compute k mass-weighted POD modes (N, k) of displacements minus their affine part.
 
     Each axis of each frame of ``trajectory`` (n, N, 3) is one snapshot (Monem et al. 2023). If the
     data have fewer modes, all are returned. ``points`` (N, 3) m is the rest shape, ``masses`` (N,)
@@ -138,7 +138,7 @@ def atoms(units: Sequence[np.ndarray], vertices: int) -> list[np.ndarray]:
 
 
 def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
-    """Smooth weights (N, handles) in [0, 1] at ``points`` (N, 3) m, with sum 1 at every vertex.
+    """Compute smooth weights (N, handles) >= 0 at ``points`` (N, 3) m, with sum 1 at each.
 
     Handles are vertices from farthest-point sampling, with Wendland's kernel
     (1 - d/R)^4 (4 d/R + 1) of the distance d <= R, divided by the sum of all kernels. R is three
@@ -155,7 +155,7 @@ def skinning_weights(points: np.ndarray, handles: int) -> np.ndarray:
 
 
 def skinning_modes(points: np.ndarray, masses: np.ndarray, k: int) -> np.ndarray:
-    """k mass-orthonormal columns (N, k) in the span of w_h [1, x, y, z], without affine part.
+    """Compute k mass-orthonormal columns (N, k) of span w_h [1, x, y, z], without affine part.
 
     w_h are the `skinning_weights` of handle h; there are as many handles as k columns require. Of
     more than k columns, those with the largest singular values are returned. ``points`` are

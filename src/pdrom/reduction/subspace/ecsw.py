@@ -149,7 +149,7 @@ def ecsw_elements(
     count = CANDIDATES
 
     def residual(elements: np.ndarray, factors: np.ndarray) -> float:
-        """Relative residual of the training equations with these samples, without hashing."""
+        """Compute the relative residual of the training equations, without hashing."""
         few, vertices = group.restricted(elements, factors)
         kept = _forces(few, np.ascontiguousarray(columns.B[vertices]), training)
         missed = [np.sum((own - sums) ** 2) for (*_, own), sums in zip(kept, totals, strict=True)]
@@ -370,13 +370,13 @@ class _ActiveSet:
         return max(found, default=0.0)
 
     def solution(self) -> tuple[np.ndarray, np.ndarray]:
-        """Indices of the active columns of G, ascending, and their entries of x (in G x near b)."""
+        """Return active columns of G, ascending, and their entries of x (in G x near b)."""
         order = np.argsort(self._active)
         active = np.array(self._active, dtype=np.int64)[order]
         return active, self._values[order] / self._norms[active]
 
     def reach(self, tolerance: float) -> bool:
-        """Activate columns of G until `relative_residual` <= ``tolerance``; return if it is."""
+        """Activate columns of G until `relative_residual` <= ``tolerance``; return success."""
         while self.relative_residual > tolerance and len(self._active) < self._most:
             block = self._choose()
             if len(block) == 0:

@@ -138,7 +138,7 @@ def _stencil(group: ConstraintGroup, model: SubspaceModel) -> np.ndarray:
 
 
 def needed_vertices(scene: Scene, models: Iterable[SubspaceModel]) -> np.ndarray:
-    """Vertices (n,) of all elements of ``scene`` that any of the ``models`` samples."""
+    """Return vertices (n,) of all elements of ``scene`` that ``models`` sample."""
     found = [_stencil(group, model).ravel() for model in models for group in scene.groups]
     return np.unique(np.concatenate([np.empty(0, np.int64), *found]))
 

@@ -96,7 +96,7 @@ class _Fused:
     def iterate(
         self, elimination: DenseElimination, s: np.ndarray, base: np.ndarray, iterations: int
     ) -> np.ndarray:
-        """Coordinates (K, 3) after a frame's iterations from prediction s; ``base``: (M/h^2) s."""
+        """Compute coordinates (K, 3) after a frame's iterations from s; ``base``: (M/h^2) s."""
         own, sampled, free = self._of(elimination), self._sampled, elimination.free
         sampled.refresh()
         targets = vectors(len(elimination.fixed))

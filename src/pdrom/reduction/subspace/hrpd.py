@@ -90,7 +90,7 @@ def sampled_space(
 def projection_space(
     rest: np.ndarray, centres: np.ndarray, weights: np.ndarray, dimension: int
 ) -> np.ndarray:
-    """W-orthonormal columns (e p, d) of the span of skinning weights times rest vectors.
+    """Build W-orthonormal columns (e p, d) of the span of skinning weights times rest vectors.
 
     The rest vectors come first, so that the rest shape and its rotations are exact. POD modes of
     the products, without their part along the rest vectors, follow.
@@ -115,6 +115,6 @@ def projection_space(
 
 
 def element_centres(group: ConstraintGroup, points: np.ndarray) -> np.ndarray:
-    """Centres (e, 3) m of the elements: means of the ``points`` (N, 3) m at their vertices."""
+    """Return centres (e, 3) m of elements: means of the ``points`` (N, 3) m at their vertices."""
     touched = touched_vertices(group)
     return (touched @ points) / np.asarray(touched.sum(axis=1)).reshape(-1, 1)

@@ -65,7 +65,7 @@ class InterpolatedLocalStep:
 
 
 def reduced_strain(group: ConstraintGroup, columns: Columns) -> tuple[np.ndarray, np.ndarray]:
-    """S B (e p, K) and stiffness B^T S^T W S B (K, K) of ``group``, B the subspace ``columns``."""
+    """Compute S B (e p, K) and B^T S^T W S B (K, K) of ``group``; B is that of ``columns``."""
     strain = group.S @ columns.B
     return strain, strain.T @ (group.row_weights[:, None] * strain)
 

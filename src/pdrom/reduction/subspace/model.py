@@ -28,7 +28,7 @@ ALL = 256  # Newton iterations of a frame that suffice for convergence
 
 
 def ecsw_name(tolerance: float) -> str:
-    """Name in tables of a model with energy-conserving sampling at the ``tolerance`` tau."""
+    """Return the name in tables of a model with energy-conserving sampling at ``tolerance``."""
     return f"{ECSW}-{tolerance:.0e}"
 
 
@@ -43,7 +43,7 @@ class SubspaceModel:
     samples: Mapping[str, Samples | Interpolation] = field(default_factory=dict)
 
     def elements_evaluated(self, scene: Scene) -> int:
-        """Number of elements of ``scene`` whose projections an iteration evaluates."""
+        """Count the elements of ``scene`` whose projections an iteration evaluates."""
         return sum(len(self.chosen(group).elements) for group in scene.groups)
 
     @property
@@ -58,12 +58,12 @@ class SubspaceModel:
         return max(found, default=None)
 
     def chosen(self, group: ConstraintGroup) -> Samples | Interpolation:
-        """Samples or interpolation of ``group``; all elements with factor 1 if it has neither."""
+        """Return samples or interpolation of ``group``; else all elements with factor 1."""
         every = Samples(np.arange(group.elements), np.ones(group.elements))
         return self.samples.get(group.name, every)
 
     def loop(self, scene: Scene, newton: bool = False) -> tuple[Stepper, State]:
-        """Step loop of ``scene``, local-global or ``newton``, and initial state, in coordinates."""
+        """Return the step loop of ``scene``, local-global or ``newton``, and the initial state."""
         steps: list[Any] = []
         for group in scene.groups:
             own = self.chosen(group)
@@ -76,7 +76,7 @@ class SubspaceModel:
         return FusedStepper(scene, space, steps, newton), reduced_state(scene, self.columns)
 
     def positions(self, z: np.ndarray) -> np.ndarray:
-        """Vertex positions (N, 3) m of coordinates ``z`` (K, 3)."""
+        """Return vertex positions (N, 3) m of coordinates ``z`` (K, 3)."""
         return self.columns.B @ z
 
     def output(self, kind: Any = np.float32) -> "Output":
@@ -177,7 +177,7 @@ def store_model(
 
 
 def stored_samples(store: h5py.Group) -> dict[str, Samples | Interpolation]:
-    """Samples of each constraint group in the HDF5 group ``store`` by `store_model`."""
+    """Read samples of each constraint group from the HDF5 group ``store``."""
     found: dict[str, Samples | Interpolation] = {}
     for name, kept in store.get("samples", {}).items():
         numbers: dict[str, Any] = {key: float(value) for key, value in kept.attrs.items()}
@@ -200,7 +200,7 @@ def load_models(path: str | os.PathLike[str]) -> list[Labelled]:
 
 
 def stored_columns(store: h5py.Group) -> spaces.Columns:
-    """Columns in the HDF5 group ``store`` by `store_columns`."""
+    """Read columns from the HDF5 group ``store``, written by `store_columns`."""
     atoms = list(store["atoms"].values()) if "atoms" in store else []
     return spaces.Columns(
         B=store["B"][...],

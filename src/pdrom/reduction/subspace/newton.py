@@ -33,7 +33,7 @@ CONVERGED, UNNOTICED, ROUNDOFF = 1e-6, 1e-2, 8.0 * np.finfo(float).eps
 
 
 def newton_arrays(sampled: Any, space: Any, system: Any, enough: float) -> tuple[Any, ...]:
-    """Arrays of `run_newton` for a `DenseElimination`; frames end at the slope ``enough``, J."""
+    """Make arrays of `run_newton` for an elimination; frames end at the slope ``enough``, J."""
     free, strain = system.free, sampled.strain[:, system.free]
     own, groups = np.ix_(free, free), sampled.groups
     (m, size), k = strain.shape, -(-len(free) // WIDE) * WIDE

@@ -24,7 +24,7 @@ def blocks(matrix: np.ndarray) -> np.ndarray:
 
 
 def vectors(count: int) -> np.ndarray:
-    """Flat array of zeros for ``count`` vectors of three numbers, padded as `product` requires."""
+    """Return zeros, flat, for ``count`` vectors of three numbers, padded as `product` requires."""
     return zeros(3 * (-(-count // TALL) * TALL) + WIDTH)
 
 
@@ -69,7 +69,7 @@ def project(strain, rows, size, offset, z, sampled):
 
 @inner
 def objective(weights, d, p, inertia, y, s):
-    """Objective, J, of y: 1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s), d = S q."""
+    """Return E(y) = 1/2 sum_i w_i |d_i - p_i|^2 + 1/2 (y - s)^T (M/h^2) (y - s), J; d = S q."""
     total = 0.0
     for i in range(len(weights)):
         for axis in range(3):

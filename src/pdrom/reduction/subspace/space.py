@@ -56,7 +56,7 @@ class DenseElimination:
         return self._inverse @ (rhs[self.free] - self._load)
 
     def response(self, inertia: np.ndarray) -> np.ndarray:
-        """Matrix (K', K) that maps a prediction s (K, 3) to the K' coordinates not fixed.
+        """Return the matrix (K', K) that maps a prediction s (K, 3) to K' free coordinates.
 
         These solve the system for ``inertia`` s, with ``inertia`` B^T M B / h^2 (K, K). Fixed
         entries of s must be those of `set_targets`.
@@ -66,7 +66,7 @@ class DenseElimination:
         return result
 
     def lift(self, rows: np.ndarray) -> np.ndarray:
-        """Product (m, K') of the columns `free` of ``rows`` (m, K) and matrix[free, free]^-1."""
+        """Multiply (m, K') the columns `free` of ``rows`` (m, K) and matrix[free, free]^-1."""
         return rows[:, self.free] @ self._inverse
 
 
@@ -131,7 +131,7 @@ class ReducedSpace(Space):
         return all(contact.height is not None for contact in self._contacts)
 
     def free_frames(self, path: np.ndarray) -> int:
-        """Number of frames in ``path`` (n, K, 3) before a probe (vertex) is below a floor."""
+        """Count frames in ``path`` (n, K, 3) before a probe (vertex) is below a floor."""
         first = len(path)
         for contact in self._contacts:
             first = contact.free_frames(path[:first])
@@ -152,12 +152,12 @@ class ReducedSpace(Space):
 
 
 def coordinates(columns: Columns, masses: np.ndarray, field: np.ndarray) -> np.ndarray:
-    """Mass-orthogonal projection (K, 3) of ``field`` (N, 3) on ``columns``, ``masses`` (N,) kg."""
+    """Project ``field`` (N, 3) mass-orthogonally on ``columns``, (K, 3); ``masses`` (N,) kg."""
     return _mass_solve(columns, masses, columns.B.T @ (masses[:, None] * field))
 
 
 def projector(columns: Columns, masses: np.ndarray) -> np.ndarray:
-    """Matrix (K, N) of the mass-orthogonal projection on ``columns``, with ``masses`` (N,) kg."""
+    """Return the matrix (K, N) of the mass-orthogonal projection on ``columns``."""
     return _mass_solve(columns, masses, (columns.B * masses[:, None]).T)
 
 
@@ -210,16 +210,16 @@ class _ReducedBoundary:
         self.vertices = np.unique(np.concatenate([np.empty(0, np.int64), *boundary.units()]))
 
     def held(self, frame: int) -> np.ndarray:
-        """Ascending indices of subspace coordinates that move the vertices held in ``frame``."""
+        """Return ascending indices of coordinates that move the vertices held in ``frame``."""
         return self._of(frame)[0]
 
     def anchor(self, frame: int, positions: np.ndarray) -> np.ndarray:
-        """Vertex positions (n, 3) m, in coordinates ``positions`` (K, 3), held in ``frame``."""
+        """Return positions (n, 3) m of vertices held in ``frame``, from coordinates (K, 3)."""
         indices, rows, _ = self._of(frame)
         return rows @ positions[indices]
 
     def path(self, frames: range, anchor: np.ndarray) -> np.ndarray:
-        """Values (n, m, 3) in ``frames`` of coordinates `held`; see `base.Boundary.path`."""
+        """Return values (n, m, 3) in ``frames`` of coordinates `held`; see `base.Boundary.path`."""
         return self._of(frames.start)[2] @ (self.boundary.path(frames, anchor) + self.shift)
 
     def _of(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -237,7 +237,7 @@ class _ReducedBoundary:
 
 
 def probe_vertices(n: int) -> np.ndarray:
-    """Probes: vertices of a mesh with n vertices at which contacts are detected, ascending."""
+    """Choose probes: vertices, of n, at which contacts are detected, ascending."""
     return np.unique(np.linspace(0, n - 1, min(PROBES, n)).round().astype(np.int64))
 
 
@@ -253,7 +253,7 @@ class _ReducedContact:
         self._held: dict[bytes, np.ndarray] = {}
 
     def free_frames(self, path: np.ndarray) -> int:
-        """Number of frames in ``path`` (n, K, 3) before a probe (vertex) is below this floor."""
+        """Count frames in ``path`` (n, K, 3) before a probe (vertex) is below this floor."""
         lowest = (path[:, :, 1] @ self._probes.T).min(axis=1)
         # a frame with non-finite coordinates counts as one with contact
         above = lowest >= self.height

@@ -44,7 +44,7 @@ def make_columns(
 
 
 def held_units(scenes: Sequence[Scene]) -> list[np.ndarray]:
-    """Sets of vertices that a boundary condition of one of ``scenes`` always fixes together."""
+    """List sets of vertices that a boundary condition of ``scenes`` always fixes together."""
     return [unit for scene in scenes for own in scene.boundaries for unit in own.units()]
 
 

@@ -89,7 +89,7 @@ def test_a_grid_that_an_effect_does_not_suit_is_left_out(caplog):
     box = {"kind": "box", "lower": list(place - near), "upper": list(place + near)}
     table = api.cost(sheet(GRAVITY, SPRING, {"effect": "pins", "select": box}, size=13, frames=2))
     assert set(table.vertices) < {169, 49, 25, 16}
-    assert "times the cells a side: scene 'test', effect 'pins': selection" in caplog.text
+    assert "of the cells along a side: scene 'test', effect 'pins': selection" in caplog.text
 
 
 def test_files_are_read_as_the_mesh_of_the_scene(tmp_path):

@@ -312,16 +312,16 @@ FAULTY = [
     (["show", "."], "is a folder"),
     (["run", "folder.h5"], "folder.h5: a result, not a scene; see `pdrom show folder.h5`"),
     (["run", "."], ".: a folder, name a file in it"),
-    ([*TRAIN, "--out", "small.yaml"], "is read by this command"),
+    ([*TRAIN, "--out", "small.yaml"], "this command reads the file"),
     (["run", "small.yaml", "--compare", "small.h5"], "--compare: only for reduced runs"),
     (["train", "small.yaml", "--modes", "4", "--r", "3"], "r: no effect without group or method"),
     (["run", "small.yaml", "--model", "none.h5"], "none.h5: no such file"),
     (["run", "small.yaml", "--frame", "3"], "--frame: only with --from"),
     (["run", "small.yaml", "--from", "x.h5", "--model", "x.h5"], "only for full-order runs"),
-    (["run", "small.yaml", "--from", "small.h5"], "is read by this command"),
+    (["run", "small.yaml", "--from", "small.h5"], "this command reads the file"),
     (["run", "small.yaml", "--model", "none.h5", "--check"], "--check: only for full-order runs"),
     (["run", "small.yaml", "--out", "."], ".: cannot be written (a folder)"),
-    (["view", "x.h5", "--png", "x.h5"], "is read by this command"),
+    (["view", "x.h5", "--png", "x.h5"], "this command reads the file"),
 ]
 
 

@@ -42,7 +42,7 @@ def test_settings_are_printed_and_drawn_with_meshes_and_models_of_files(folder, 
         ("--model none.h5", "none.h5: no such file"),
         ("--plot cost", "--plot cost: only PNG is written; choose a name in .png"),
         ("--plot taken.png", "taken.png: cannot be written"),
-        ("--coarser taken.png --plot taken.png", "taken.png: would be overwritten"),
+        ("--coarser taken.png --plot taken.png", "taken.png: this command reads"),
     ],
 )
 def test_wrong_files_are_refused_before_anything_runs(folder, capsys, options, fault):
