@@ -122,7 +122,7 @@ class Model:
         """Simulate ``scene`` with the model; a run that blows up ends early and is returned, too.
 
         scene : scene with the mesh and the constraint groups of the training; weights, masses,
-            forces and the time step may differ; it may hold what the training held or declared
+            forces and the time step may differ; it holds only vertices held or declared in training
         out : file (HDF5) to write; None writes no file
         on_frame : called after each frame with its number, from 0, and the solver's report
         iterations : of a frame; None: until convergence (Newton's method), or as in the scene
@@ -157,7 +157,7 @@ class Model:
             subspaces.require_holds(scene, self.reduced.columns)
             return self.reduced.loop(scene, newton)
         if newton:
-            raise ConfigurationError("model: solver = newton needs a position subspace")
+            raise ConfigurationError("model: only a position subspace allows solver = newton")
         return self.reduced.loop(scene)
 
     def view(self, path: str | os.PathLike[str], full: Run | None = None) -> None:
@@ -170,12 +170,12 @@ class Model:
         require_page(files.output(path))
         own, scene, positions = self.reduced, self.scene, None
         if not isinstance(own, SubspaceModel):
-            raise NotReducibleError(f"{self.title} runs in no page; train without a method")
+            raise NotReducibleError(f"a page cannot run {self.title}: train without a method")
         if full is not None:
             scene, positions = files.require_run(full, "full").scene, full.positions
             if not full.full_order:
                 raise ConfigurationError(f"full = {full.title}: a full-order run is required")
-        self.loop(scene)  # refuses what `run` refuses
+        self.loop(scene)  # raises the errors of `run`
         config, family = scene.config, "elements" if own.samples else "all"
         labels = {"family": family, "k": own.columns.modes, "tau": self.training.tolerance}
         content = export_page(scene, config.title, positions, [(labels, own)])

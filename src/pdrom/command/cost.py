@@ -53,7 +53,7 @@ def shown(table: "pd.DataFrame", frames: int) -> str:
     ]
     if error is not None:
         what = f"estimated position error that is due to the mesh: {error:.2g}"
-        lines.append(f"{what}; a smaller error of a setting is no gain in accuracy")
+        lines.append(f"{what}; smaller errors are not closer to the real body")
     return "\n".join(lines)
 
 

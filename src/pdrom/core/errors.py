@@ -57,7 +57,7 @@ class SceneError(PdromError):
 
 
 class NotReducibleError(SceneError):
-    """A scene has an effect that cannot be simulated in a position subspace."""
+    """A scene cannot be reduced: an effect prevents it, nothing moves, or no model is accurate."""
 
 
 class SolverError(PdromError):

@@ -17,7 +17,7 @@ from pdrom.core.yamlfile import ConfigModel
 
 
 class Machine(ConfigModel):
-    """Machine and code that produced the results; timings and last digits depend on both.
+    """Machine and code that produced the results; timings and last digits depend on them.
 
     threads : largest number of threads that one of the libraries would use
     kernels : linear algebra and threading libraries in the process, see `loaded_kernels`

@@ -1,6 +1,6 @@
 """Provenance of a result: the job that made it, its settings, code and libraries.
 
-Inside the context `made_by`, `pdrom.core.store` stores the provenance beside the checksum of every
+Inside the context `made_by`, `pdrom.core.store` stores the provenance with the checksum of every
 file it writes, in HDF5 files also as attributes. Two runs of one job have equal provenance: it
 contains no date and no commit, since a commit may change only documentation. In the workflow it
 identifies a file: a copy under another name does not count as the result.

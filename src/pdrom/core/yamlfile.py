@@ -52,7 +52,7 @@ _DATE = "tag:yaml.org,2002:timestamp"
 
 
 def _misread(text: str) -> bool:
-    """Whether YAML 1.1 or Python reads ``text`` as a number other than the decimal one it shows."""
+    """Tell whether YAML 1.1 or Python reads ``text`` as another number than the decimal shown."""
     return bool(_NUMBER.fullmatch(text)) and not _PLAIN.fullmatch(text)
 
 

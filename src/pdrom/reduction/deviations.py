@@ -129,7 +129,7 @@ class Yardstick:
     def errors(self, positions: np.ndarray, end: int) -> tuple[float | None, float | None]:
         """Compute position and deformation error of ``positions`` (F' + 1, N, 3) m up to ``end``.
 
-        Both are None if the run ended earlier.
+        Both errors are None if the run ended earlier.
         """
         if len(positions) <= end:
             return None, None
@@ -141,7 +141,7 @@ class Yardstick:
         )
 
     def differences(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute norms (F',) m of position and shape differences of ``positions`` in all frames."""
+        """Compute norms (F',) of position and shape differences; ``positions`` (F' + 1, N, 3) m."""
         blocks, masses = _blocks(positions, self.reference), self.scene.masses
         apart = [np.linalg.norm((q - p)[1:], axis=(1, 2)) for q, p in blocks]
         shapes = [metrics.shape_differences(q[1:], p[1:], masses) for q, p in blocks]

@@ -13,7 +13,7 @@ from pdrom.model.scene import Scene
 
 @dataclass(frozen=True)
 class Rerun:
-    """Result of a reduced run; one that blows up ends in the frame `blowup_frame`."""
+    """Result of a reduced run; a run that blows up ends in the frame `blowup_frame`."""
 
     positions: np.ndarray  # (F' + 1, N, 3) m of the initial state and of F' finite frames
     difference: np.ndarray  # (F',) m, || Q_red - Q_fom ||_F of the positions in each frame

@@ -103,7 +103,7 @@ def loop_of(
 
 
 def pareto(error: Sequence[float], cost: Sequence[float]) -> list[bool]:
-    """Tell which points are Pareto-optimal: no other is as good in both values, better in one."""
+    """Tell which points no other dominates, by being as good in both values and better in one."""
     return [
         not any((e <= a) & (c <= b) & ((e < a) | (c < b)) for e, c in zip(error, cost, strict=True))
         for a, b in zip(error, cost, strict=True)

@@ -46,7 +46,7 @@ class Window(NamedTuple):
 
 @dataclass(frozen=True)
 class Camera:
-    """Parallel projection; with another ``up`` than y, the whole camera is turned by `rotation_to`.
+    """Parallel projection, turned by `rotation_to` if ``up`` is not y.
 
     azimuth : degrees about the upward axis; if that is y, 0 looks along -z and 90 along -x
     elevation : degrees of the eye above the plane normal to ``up``; 90 looks straight down
@@ -113,7 +113,7 @@ def shown_region(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return two corners, m, of a cube with a margin around ``positions`` (F, N, 3) m of a run.
 
-    An obstacle among the ``effects`` that reaches into the margin is inside the cube as a whole,
+    An obstacle among the ``effects`` that reaches into the margin lies completely in the cube,
     unless it is larger than the run. Parts of runs and obstacles outside the cube are not shown.
     """
     low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))

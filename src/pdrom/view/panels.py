@@ -29,7 +29,7 @@ class RunPanel:
     remark : one line below the picture
     reference : whether this is the run with which the other runs are compared
     obstacles : surfaces of the obstacles; None draws the floor y = 0
-    cropped : whether what exceeds the window is cut off, rather than drawn smaller
+    cropped : whether parts outside the window are cut off, instead of drawing the run smaller
     """
 
     title: str

@@ -1,6 +1,6 @@
 """Reading and writing results: atomic, deterministic, with checksums and clear errors.
 
-A result is written to a temporary file beside its target and renamed when complete, so that an
+A result is written to a temporary file next to its target and renamed when complete, so that an
 interrupted job never leaves a half-written file and never damages an older one. Every reader checks
 the result's checksum (`pdrom.core.store.checksum`).
 """
@@ -35,7 +35,7 @@ __all__ = [
 ]  # fmt: skip
 # Every page, picture and ParaView file of pdrom has this text in its first or last MARKED bytes.
 MARK, MARKED = b"made by pdrom, which may replace this file", 65_536
-# Hash of the machine's name, part of temporary file names: a machine removes only its own files.
+# Hash of the machine's name, part of temporary file names, so that it removes only its files.
 _MACHINE = hashlib.blake2b(platform.node().encode(), digest_size=2).hexdigest()
 
 
@@ -136,7 +136,7 @@ def _bring_to_disk(path: Path) -> None:
 
 
 def write_text(text: str, path: str | os.PathLike[str], with_checksum: bool = True) -> None:
-    """Write ``text`` as UTF-8 to ``path``; ``with_checksum`` writes a checksum file, too."""
+    """Write ``text`` as UTF-8 to ``path``; ``with_checksum`` adds a checksum file."""
     with atomic_path(path, with_checksum) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
@@ -158,7 +158,7 @@ def read_table(
 ) -> "pd.DataFrame":
     """Read the CSV table ``path``; StorageError if missing, damaged or without one of ``columns``.
 
-    ``result`` tells whether the pipeline wrote the table, with a checksum, which is then checked.
+    ``result`` tells whether the pipeline wrote the table, so that its checksum must be checked.
     """
     import pandas as pd
 

@@ -107,7 +107,7 @@ def block_elements(v: np.ndarray, size: int) -> np.ndarray:
 def joint_rows(v: np.ndarray, active: tuple[bool, ...], repeat: bool) -> np.ndarray:
     """Select rows (x, y, z) of a basis ``v`` (3 rows, r) for r modes; k modes use the first k.
 
-    For mode k each axis a has its own system (P^T V_a) c_a = P^T v_{k,a}, where P^T selects rows.
+    For mode k each axis a has a separate system (P^T V_a) c_a = P^T v_{k,a}; P^T selects rows.
     An axis without modes, False in ``active``, is left out. The row with the largest sum of squared
     residuals is selected for all axes. It may be useless for one axis, whose system is then solved
     in the least-squares sense. With ``repeat`` a row may be selected again, as in the program of

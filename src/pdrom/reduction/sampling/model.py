@@ -1,4 +1,4 @@
-"""Model of a scene with the projections of one constraint group reduced, all vertices kept."""
+"""Model of a scene with reduced projections of one constraint group and with all vertices."""
 
 from dataclasses import dataclass
 

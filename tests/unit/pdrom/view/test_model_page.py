@@ -41,7 +41,7 @@ def test_all_elements_are_computed_as_in_pdrom_and_no_run_is_shown_unless_given(
 def test_what_no_page_shows_is_refused_by_name(folder, tmp_path, capsys):
     full, ball = (api.run(make_scene(*EFFECTS, *more, **SHEET)) for more in ((), (BALL,)))
     model, out = api.load_model(folder / "a.model.h5"), tmp_path / "b.html"
-    projections = api.train(full, method="gappy", r=2), None, "runs in no page"
+    projections = api.train(full, method="gappy", r=2), None, "a page cannot run"
     reduced = model, model.run(full.scene), "a full-order run is required"
     for one, shown, words in (projections, reduced, (model, ball, "no 'sphere'")):
         with pytest.raises(PdromError, match=words):
