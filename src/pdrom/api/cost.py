@@ -85,7 +85,7 @@ def cost(
     table.loc[order, "ms"] = times
     best = settings.pareto(table.position_error.tolist(), table.ms.tolist())
     table["best"] = np.array(best) & np.isfinite(table.position_error)
-    log.info("%s: estimating the error of the mesh by coarser ones", name)
+    log.info("%s: estimating the error of the mesh by coarser meshes", name)
     ends = meshes[:: max(1, len(meshes) - 1)]
     runs = [mesh.converged(tolerance_of(mesh.scene), EVALUATIONS) for mesh in ends[1:] and ends]
     table = table.sort_values("ms", ignore_index=True)

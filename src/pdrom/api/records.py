@@ -69,7 +69,7 @@ class Errors:
 
     def __str__(self) -> str:
         shown = ["none" if e is None else f"{e:.2g}" for e in (self.position, self.deformation)]
-        errors = f"errors {shown[0]} (positions) and {shown[1]} (deformation)"
+        errors = f"relative errors {shown[0]} (positions) and {shown[1]} (deformation)"
         return f"{errors} against {self.reference}"
 
 
@@ -132,7 +132,7 @@ class Run:
     def title(self) -> str:
         """Description of the run in messages and of references."""
         config, asked = self.scene.config, self.scene.config.iterations
-        title = f"the run of '{config.name}' by {self.method}"
+        title = f"the run of '{config.name}' by {self.method.replace(FULL, 'the full-order model')}"
         if self.method != FULL:
             return title
         if isinstance(asked, int):

@@ -205,7 +205,7 @@ def _trained(
     if own is None and columns.modes < count:
         log.warning("%d modes are requested, but only %d exist", count, columns.modes)
     if asked.tolerance is not None:
-        log.info("%d columns: selecting elements", columns.B.shape[1])
+        log.info("selecting elements for a subspace of %d columns", columns.B.shape[1])
         longest = max(scene.config.frames for scene in scenes)
         all_frames, bounds = np.arange(longest), [asked.tolerance]
         (reduced,) = sampled_models(scenes, columns, all_frames, bounds, choose=selection)

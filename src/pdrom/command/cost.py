@@ -24,7 +24,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     scene, out = load_scene(arguments.scene), arguments.plot
     if out:
         if Path(out).suffix.lower() != ".png":
-            raise ConfigurationError(f"--plot {out}: only PNG is written; choose a name in .png")
+            raise ConfigurationError(f"--plot {out}: only PNG is written; end the name in .png")
         require_output(out, [arguments.scene, *arguments.coarser, *arguments.model], scene)
     table = cost(scene, arguments.coarser, arguments.model, Progress)
     sys.stdout.write(f"{shown(table, scene.config.frames)}\n")
@@ -47,7 +47,7 @@ def shown(table: "pd.DataFrame", frames: int) -> str:
     busy, error = table.attrs["busy"], table.attrs["mesh_error"]
     lines = [
         table.assign(**columns)[[*columns]].to_string(index=False),
-        "* no other setting is as accurate (position error) and as fast, and better in one of them",
+        "* best: every other setting is slower or has a larger position error",
         f"relative errors against converged time steps over {frames} frames; times of the first "
         f"{table.attrs['frames']} frames{', unreliable: other programs ran' * busy}",
     ]

@@ -68,7 +68,7 @@ def measure(variants: Sequence[Variant], warmup: int, repeats: int) -> list[dict
         for own, variant in zip(samples, variants, strict=True):
             frames = variant.frames if repeat >= 0 else variant.warm or variant.frames
             own.append(_time_once(variant, frames))
-        log.info("repeat %d of %d", max(0, repeat + 1), repeats)
+        log.info("timing: repeat %d of %d", max(0, repeat + 1), repeats)
     times = [median_frames(np.array(own[warmup:])).tolist() for own in samples]
     return [
         {**variant.labels, **dict(zip(PHASES, own, strict=True))}

@@ -76,7 +76,7 @@ def write_page(scenes: Sequence[ViewedScene], path: str | os.PathLike[str]) -> N
 def require_page(path: str | os.PathLike[str]) -> None:
     """Raise ConfigurationError if ``path`` is not the name of a page."""
     if not os.fspath(path).lower().endswith((".html", ".htm")):
-        raise ConfigurationError(f"{path}: a page is HTML; choose a name in .html")
+        raise ConfigurationError(f"{path}: a page is HTML; end the name in .html")
 
 
 def page_of(parts: Sequence[str], scenes: Sequence[Mapping[str, Any]]) -> str:

@@ -57,7 +57,7 @@ def test_all_columns_and_elements_are_the_full_order(full, effects):
     assert found.positions == pytest.approx(expected.positions, abs=1e-9)
     errors = found.error(expected)
     assert max(errors.position, errors.deformation) < 1e-8
-    assert errors.reference == "the run of 'scene' by full order, 7 iterations a frame"
+    assert errors.reference == "the run of 'scene' by the full-order model, 7 iterations a frame"
 
 
 def test_the_validation_has_the_errors_of_every_trajectory_and_of_replaying(full, model):

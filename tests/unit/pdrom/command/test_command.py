@@ -61,7 +61,7 @@ def test_a_scene_is_run_a_model_trained_and_run_and_all_is_shown(folder, capsys)
     assert run(compared) == Status.DONE
     first, second = capsys.readouterr().out.splitlines()
     assert first.startswith("small_small.h5: 12 frames")
-    assert "against the run of 'small' by full order, 10 iterations" in second
+    assert "against the run of 'small' by the full-order model, 10 iterations" in second
     assert run(["view", "small_small.h5", "small.h5"]) == Status.DONE
     goes_on = ["run", "small.yaml", "--from", "small.h5", "--frame", "5", "--out", "later.h5"]
     assert run(goes_on) == Status.DONE

@@ -40,7 +40,7 @@ def test_settings_are_printed_and_drawn_with_meshes_and_models_of_files(folder, 
     [
         ("--coarser none.obj", "none.obj: no such mesh file"),
         ("--model none.h5", "none.h5: no such file"),
-        ("--plot cost", "--plot cost: only PNG is written; choose a name in .png"),
+        ("--plot cost", "--plot cost: only PNG is written; end the name in .png"),
         ("--plot taken.png", "taken.png: cannot be written"),
         ("--coarser taken.png --plot taken.png", "taken.png: this command reads"),
     ],

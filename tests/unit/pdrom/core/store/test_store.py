@@ -159,7 +159,7 @@ def test_a_file_that_reads_others_is_refused(tmp_path, kind):
             layout = h5py.VirtualLayout((4,), "f8")
             layout[:] = h5py.VirtualSource(str(other), "x", (4,))
             inside.create_virtual_dataset("x", layout)
-        with pytest.raises(StorageError, match="x is no data of this file"):
+        with pytest.raises(StorageError, match="x refers to data outside this file"):
             store.require_self_contained(file, path)
 
 
