@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from pdrom.api.files import output, require_run
-from pdrom.api.records import Run
+from pdrom.api.records import FULL, FULL_MODEL, Run
 from pdrom.core.errors import SceneError
 from pdrom.view import style
 from pdrom.view.artists import Figure
@@ -40,7 +40,7 @@ def plot(reference: Run, *runs: Run) -> Figure:
         for i, (run, error) in enumerate(zip(runs, errors, strict=True)):
             time = run.scene.config.time_step * np.arange(1, len(error) + 1)
             colour = style.CYCLE[i % len(style.CYCLE)]
-            ax.plot(time, error, color=colour, label=run.method)
+            ax.plot(time, error, color=colour, label=run.method.replace(FULL, FULL_MODEL))
             if run.blowup_frame is not None and len(time):
                 ax.plot(time[-1:], error[-1:], color=colour, marker="x", markersize=5)
         ax.set_xlim(0.0, None)
@@ -118,10 +118,10 @@ def _viewed(runs: list[Run]) -> ViewedScene:
     config, shown = first.scene.config, []
     for run in (each for each in runs if each is not first):
         ms = float(np.median(run.ms)) if len(run.ms) else None
-        errors = run.errors(first)
-        shown.append(ViewedRun(run.method, run.positions, errors, run.blowup_frame, ms))
+        errors, label = run.errors(first), run.method.replace(FULL, FULL_MODEL)
+        shown.append(ViewedRun(label, run.positions, errors, run.blowup_frame, ms))
     return ViewedScene(
         name=config.name, title=config.title, mesh=first.scene.mesh, time_step=config.time_step,
         positions=first.positions, ms=float(np.median(first.ms)), effects=config.effects,
-        runs=tuple(shown), method=first.method,
+        runs=tuple(shown), method=first.method.replace(FULL, FULL_MODEL),
     )  # fmt: skip

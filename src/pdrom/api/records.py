@@ -51,7 +51,7 @@ class Snapshots:
         require_types(self)
 
 
-FULL = "full order"
+FULL, FULL_MODEL = "full order", "full-order model"  # in files; in words
 STILL = 1e-6  # nothing moves if no coordinate changes by more than this fraction of the extent
 
 
@@ -132,7 +132,7 @@ class Run:
     def title(self) -> str:
         """Description of the run in messages and of references."""
         config, asked = self.scene.config, self.scene.config.iterations
-        title = f"the run of '{config.name}' by {self.method.replace(FULL, 'the full-order model')}"
+        title = f"the run of '{config.name}' by {self.method.replace(FULL, f'the {FULL_MODEL}')}"
         if self.method != FULL:
             return title
         if isinstance(asked, int):

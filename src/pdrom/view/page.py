@@ -58,7 +58,7 @@ class ViewedScene:
     ms: float | None
     runs: tuple[ViewedRun, ...] = ()
     effects: tuple[EffectConfig, ...] = ()
-    method: str = "full order"
+    method: str = "full-order model"
 
 
 LARGEST = 25_000_000  # largest number of bytes of a page
