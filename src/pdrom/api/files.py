@@ -83,8 +83,8 @@ def require_no_mesh(path: Path) -> None:
 def load_scene(path: str | os.PathLike[str]) -> Scene:
     """Read the scene that the YAML file ``path`` describes, with its mesh.
 
-    A relative path of a mesh file is relative to the folder of the YAML file. Raises
-    ConfigurationError, which names the file, the key and the fault.
+    The path of a mesh file is relative to the folder of the YAML file. Raises ConfigurationError,
+    which names the file, the key and the fault.
     """
     path = file_path(path)
     require_no_mesh(path)
@@ -136,7 +136,7 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> Run:
 
     The file is never changed. ``unchecked`` accepts a file without a checksum, but not a wrong
     checksum. Raises StorageError if the file is missing, damaged or without a checksum, links to
-    other files, or lacks data of its scene, or if these are not finite or of a wrong shape.
+    other files, or if data of its scene are missing, not finite or of a wrong shape.
     """
     path = file_path(path)
     with opened(path, "run", unchecked) as file:

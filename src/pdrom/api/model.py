@@ -80,7 +80,7 @@ class Model:
     scene : first training scene
     reduced : model of the unknowns: coordinates of a position subspace, with sampled elements, or
         all vertices, with reduced projections of one group
-    training : how it was trained
+    training : settings and cost of the training
     validation : table of trajectories: ``trajectory``, ``position_error``, ``deformation_error``,
         ``replay_error`` (position error of replaying the first training run), ``ms`` per frame,
         ``speedup`` over the full-order model, ``busy`` (times are unreliable, since other programs
@@ -125,7 +125,7 @@ class Model:
             forces and the time step may differ; it holds only vertices held or declared in training
         out : file (HDF5) to write; None writes no file
         on_frame : called after each frame with its number, from 0, and the solver's report
-        iterations : of a frame; None: until convergence (Newton's method), or as in the scene
+        iterations : per frame; None: until convergence (Newton's method), or as in the scene
         solver : "newton" or "local_global" (as the full-order model); None: `Training.solver`
 
         Returns positions of all vertices, and milliseconds of each frame, including their

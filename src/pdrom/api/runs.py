@@ -66,7 +66,7 @@ def run(
     scene : scene made by `build_scene` or `load_scene`
     out : file (HDF5) to write; None writes no file
     on_frame : called after each frame with its number, from 0, and the solver's report
-    start : run with the same mesh and time step that ``scene`` continues
+    start : run that ``scene`` continues; both have the same mesh and time step
     frame : number of frames of ``start`` that are kept (None: all). Frame numbers continue, also
         those of holds; pins that ``start`` lacks begin there, and handles at their key ``start``
     estimate : estimate the error of every 20th frame, see `pdrom.model.dynamics.convergence`

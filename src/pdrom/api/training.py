@@ -132,7 +132,7 @@ def train(
     converged : solve the training scenes again until every frame has converged
     error : return the smallest of the models of 20, 40 and 80 modes whose errors of positions and
         deformation are at most this on all validation trajectories (``validate`` of at least 1)
-    group : reduce the projections of this constraint group instead of all positions
+    group : reduce the projections of this group instead; if None, ``method`` takes the only group
     method : name in config/methods.yaml, or a specification, of the method that reduces them
     r : number of modes of these projections
     progress : called with name and number of frames of each long step; returns a function that is
