@@ -52,7 +52,7 @@ def cost(
         is called after each frame
 
     Returns a table, fastest first: ``setting`` in words, ``method``, ``iterations`` of a frame
-    (NA: converged), ``vertices`` that are simulated, `ERRORS` against converged time steps (NaN: rigid
+    (NA: converged), ``vertices`` that are simulated, `ERRORS` against converged steps (NaN: rigid
     body, inf: blew up), ``ms`` per frame, ``best`` (Pareto-optimal in position error and
     time). ``attrs``: number of timed ``frames``, ``busy`` (times are unreliable, since other
     programs ran), ``mesh_error`` (see `error_of_mesh`). Raises PdromError if an argument or file is
