@@ -110,7 +110,7 @@ class Run:
                 raise SnapshotError(f"snapshots of {name}: {fault}")
             rows = group.elements * group.rows_per_element
             arrays[f"snapshots of {name}"] = own.p, (count, rows, 3)
-            arrays[f"round-off of {name}"] = own.roundoff, (count,)
+            arrays[f"rounding errors of {name}"] = own.roundoff, (count,)
         for name, (array, shape) in arrays.items():
             known = array.dtype in (np.float32, np.float64) and not np.ma.isMaskedArray(array)
             if array.shape != shape or not known:
@@ -143,7 +143,7 @@ class Run:
         """Raise SnapshotError, naming the run ``name``, if it has NaN or infinite numbers."""
         arrays = {"positions": self.positions, "ms": self.ms}
         for group, own in self.snapshots.items():
-            arrays |= {f"snapshots of {group}": own.p, f"round-off of {group}": own.roundoff}
+            arrays |= {f"snapshots of {group}": own.p, f"rounding errors of {group}": own.roundoff}
         for array, values in arrays.items():
             require_finite(f"{name}: {array}", values, SnapshotError)
 
