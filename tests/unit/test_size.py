@@ -12,8 +12,8 @@ from places import tracked
 
 LIMITS = {
     "lines of src": 34_140,
-    "lines of tests": 21_150,
-    "words of documentation": 20_080,
+    "lines of tests": 21_215,
+    "words of documentation": 18_000,
     "tables": 27,
     "figures": 22,
     "experiments": 20,
