@@ -146,7 +146,7 @@ SCENES = [RICH_SCENE, BAR_SCENE, FILE_SCENE]
 @FUZZ
 @given(data=st.data())
 @pytest.mark.parametrize("text", SCENES, ids=["rich", "bar", "file"])
-def test_mutated_scenes(project: Path, text: str, data: st.DataObject) -> None:
+def test_mutated_scenes_are_read_or_refused(project: Path, text: str, data: st.DataObject) -> None:
     accepted_or_named(project, small.SCENE, data.draw(mutated(yaml.safe_load(text))))
 
 
@@ -159,7 +159,9 @@ def test_the_scenes_are_valid_before_they_are_mutated(tmp_path: Path, text: str)
 @FUZZ
 @given(data=st.data())
 @pytest.mark.parametrize("section", [None, "ladder", "hard_cases"])
-def test_mutated_studies(project: Path, section: str | None, data: st.DataObject) -> None:
+def test_mutated_studies_are_read_or_refused(
+    project: Path, section: str | None, data: st.DataObject
+) -> None:
     full = yaml.safe_load((small.CONFIG / "default.yaml").read_text(encoding="utf-8"))
     own = yaml.safe_load(small.SMALL_STUDY) | {
         "subspace": {**full["subspace"], "scenes": ["small"]}
@@ -171,7 +173,7 @@ def test_mutated_studies(project: Path, section: str | None, data: st.DataObject
 @FUZZ
 @given(data=st.data())
 @pytest.mark.parametrize("name", FILES)
-def test_mutated_files(project: Path, name: str, data: st.DataObject) -> None:
+def test_mutated_files_are_read_or_refused(project: Path, name: str, data: st.DataObject) -> None:
     path = f"config/{name}.yaml"
     content = yaml.safe_load((project / path).read_text(encoding="utf-8"))
     accepted_or_named(project, path, data.draw(mutated(content)))
@@ -180,5 +182,5 @@ def test_mutated_files(project: Path, name: str, data: st.DataObject) -> None:
 @FUZZ
 @given(content=st.binary(max_size=200) | st.text(max_size=60).map(str.encode))
 @pytest.mark.parametrize("path", [small.STUDY, small.SCENE])
-def test_any_bytes_as_a_file(project: Path, path: str, content: bytes) -> None:
+def test_files_of_any_bytes_are_read_or_refused(project: Path, path: str, content: bytes) -> None:
     accepted_or_named(project, path, content)

@@ -135,7 +135,7 @@ def random_forces(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, f
     return forces, float(max(norms))
 
 
-def test_the_bound_holds_in_random_scenes_and_is_nearly_met():
+def test_the_bound_of_the_theorem_holds_in_random_scenes_and_is_nearly_reached():
     """Masses, forces, holds and pushes at random; one mode pushed in resonance comes close."""
     used: list[float] = []
     for seed in range(2 * SCENES):
@@ -153,7 +153,7 @@ def test_the_bound_holds_in_random_scenes_and_is_nearly_met():
 
 
 @pytest.mark.parametrize("tangent", [0.1, 0.3, 3.0])
-def test_growth_for_ever_is_that_of_a_resonance(tangent):
+def test_a_mode_driven_in_resonance_grows_by_the_closed_formula(tangent):
     """A mode driven with the signs of its own answer; reference: the recursion of a frame."""
     m, angle = np.arange(2000), np.arctan(tangent)
     answer = np.sin(angle) * np.cos(angle) ** m * np.sin((m + 1) * angle)

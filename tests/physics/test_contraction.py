@@ -75,7 +75,7 @@ def _slope(group: ConstraintGroup, y: np.ndarray) -> float:
 
 @pytest.mark.parametrize("method", ["pod", "block"])
 @pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
-def test_contraction_is_at_most_gain_times_stiff_share(group, method):
+def test_contraction_is_at_most_deim_constant_times_stiff_share(group, method):
     """|T|_A <= gamma_W J theta: gain and derivative in the W norm, theta = h^2 w^2 / (1 + h^2 w^2).
 
     With equal weights gamma_W is the gain itself.
@@ -94,7 +94,7 @@ def test_contraction_is_at_most_gain_times_stiff_share(group, method):
     assert 0.0 < _contraction(scene, reduction, y) <= gain * _slope(g, y) * theta * (1 + 1e-5)
 
 
-def test_below_one_the_iterates_meet():
+def test_two_starts_converge_to_each_other_if_the_contraction_is_below_one():
     """Two starts 1e-3 apart come together at the rate of the contraction number, or faster."""
     scene, reduction, positions = _case("spring", METHODS["pod"])
     (group,) = scene.groups

@@ -158,13 +158,13 @@ def check_full_order(name: str, case: HardCase, scene: Scene) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_full_order_run_is_bounded_and_keeps_what_physics_says(name):
+def test_a_full_order_run_is_bounded_and_conserves_momentum(name):
     check_full_order(name, CASES[name], CASES[name].scene())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LONG)
-def test_a_run_of_two_thousand_frames_is_as_good(name):
+def test_a_run_of_two_thousand_frames_is_bounded_and_conserves_momentum(name):
     check_full_order(name, LONG[name], LONG[name].scene().changed(frames=2000))
 
 
@@ -178,7 +178,7 @@ def test_a_run_of_two_thousand_frames_is_as_good(name):
         ([SPRING, {"effect": "self_collision", "thickness": 0.0}], {}),
     ],
 )  # fmt: skip
-def test_what_cannot_be_solved_is_refused(effects, settings):
+def test_a_case_that_cannot_be_solved_is_refused(effects, settings):
     case = HardCase("", "sheet", effects, settings=settings)
     with pytest.raises(PdromError):
         rises(case.scene().stepper(), case.scene(), start_of(case.scene(), mapped=[1.1, 1, 1]))
@@ -195,7 +195,7 @@ def pairs(reductions: Sequence[str]) -> list[Any]:
 
 
 @pytest.mark.parametrize(("name", "reduction"), pairs(REDUCTIONS))
-def test_outcome_is_as_expected(name, reduction):
+def test_a_reduction_fails_exactly_where_the_configuration_expects_it(name, reduction):
     found = outcomes.row(training(name), reduction, METHODS, EXPECTED)
     expected = EXPECTED.get(reduction, outcomes.Expectation(why="it never fails anywhere"))
     if found["outcome"] not in (outcomes.HOLDS, outcomes.NOTHING, outcomes.NOT_TAKEN):
@@ -245,7 +245,7 @@ FIRST = {
 
 
 @pytest.mark.parametrize("name", sorted({*FIRST.values()}))
-def test_a_subspace_takes_what_the_effects_say(name):
+def test_a_subspace_accepts_exactly_the_effects_that_support_it(name):
     """A subspace that refuses an effect names it; methods in vertex positions take all effects."""
     for reduction in ("pod-full", "pod"):
         found = outcomes.row(training(name), reduction, METHODS, EXPECTED)

@@ -19,7 +19,7 @@ def test_rest_stays_at_rest_and_free_fall_is_a_rigid_parabola(group_scene):
 
 
 @pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
-def test_angular_momentum_of_the_converged_step(group, rng):
+def test_the_converged_step_conserves_angular_momentum(group, rng):
     """The converged implicit step conserves q x v with q at the end of the step.
 
     Internal forces are derivatives of a rotation-invariant energy, hence sum_v y_v x f_v = 0 at the
@@ -38,7 +38,7 @@ def test_angular_momentum_of_the_converged_step(group, rng):
 
 
 @pytest.mark.parametrize("spread", [0.05, 1.0, 50.0])
-def test_objective_never_rises(group_scene, rng, spread):
+def test_the_objective_never_rises_in_an_iteration(group_scene, rng, spread):
     """For fixed s each local/global iteration is a descent step, from any state."""
     scene = group_scene.changed(iterations=40, frames=3)
     loop = scene.stepper()
@@ -52,7 +52,7 @@ def test_objective_never_rises(group_scene, rng, spread):
         assert (np.diff(report.objective) <= 1e-12 * report.objective[0]).all()
 
 
-def test_rotation_and_translation_equivariance(group_scene, rng):
+def test_a_rotated_and_shifted_scene_has_the_rotated_and_shifted_run(group_scene, rng):
     scene = group_scene
     rotation, shift = random_rotation(rng), rng.standard_normal(3)
     points = scene.mesh.points + 0.02 * rng.standard_normal(scene.mesh.points.shape)
@@ -80,7 +80,7 @@ def test_handles_reach_their_target(window):
     assert final[bottom] == pytest.approx(turned, abs=1e-12)
 
 
-def test_momentum_is_kept_and_energy_does_not_grow_without_forcing(group_scene, rng):
+def test_momentum_is_conserved_and_energy_does_not_grow_without_external_forces(group_scene, rng):
     """Implicit Euler is dissipative: kinetic plus constraint energy never exceeds its start.
 
     The projections are internal forces: they sum to zero, for every group. Bending is moved gently:

@@ -33,7 +33,7 @@ def largest_error(mesh: dict, group: dict, iterations: int) -> float:
     [(SOLID, BAR, 0.0, 1), (SOLID, BAR, 0.3, 10), (SOLID, BAR, 0.45, 29),
      (SHEET, STRIP, 0.0, 1), (SHEET, STRIP, 0.3, 7), (SHEET, STRIP, 0.45, 8)],
 )  # fmt: skip
-def test_stretched_bodies_are_those_of_their_material_to_1_percent(group, mesh, nu, iterations):
+def test_stretched_bodies_have_their_material_constants_to_1_percent(group, mesh, nu, iterations):
     group = group | {"poisson": nu}
     assert largest_error(mesh, group, iterations) < 0.01
     assert iterations == 1 or largest_error(mesh, group, iterations - 1) > 0.01
@@ -58,7 +58,7 @@ def square(side: int, shaken: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(("side", "shaken"), [(11, 0.0), (21, 0.0), (41, 0.0), (21, 0.25)])
-def test_bending_has_the_rigidity_of_a_plate_only_if_the_boundary_is_held(side, shaken):
+def test_bending_has_the_rigidity_of_a_plate_only_if_the_boundary_is_fixed(side, shaken):
     """With free edges, each of their vertices has a shape without energy: no stiffness in N m."""
     held = {"effect": "pins", "select": {"kind": "boundary_loop", "index": 0}}
     pull = {"effect": "gravity", "acceleration": [0.0, -1.0, 0.0]}

@@ -9,7 +9,7 @@ GRADIENT = np.array([[1.3, 0.2, -0.1], [0.05, 0.8, 0.3], [-0.2, 0.1, 1.1]])
 
 
 @pytest.mark.parametrize("plane", ["xy", "xz"])
-def test_triangles_see_a_constant_gradient(plane):
+def test_triangles_have_the_gradient_of_an_affine_map_exactly(plane):
     """S q of an affinely mapped sheet has the singular values of the map in the sheet's plane."""
     mesh = {"kind": "cloth", "rows": 4, "columns": 5, "plane": plane}
     scene = make_scene({"effect": "strain", "weight": 1.0}, mesh=mesh)
@@ -22,7 +22,7 @@ def test_triangles_see_a_constant_gradient(plane):
     )
 
 
-def test_tetrahedra_see_a_constant_gradient():
+def test_tetrahedra_have_the_gradient_of_an_affine_map_exactly():
     mesh = {"kind": "bar", "nx": 4, "ny": 3, "nz": 3}
     scene = make_scene({"effect": "deformation_gradient", "weight": 1.0}, mesh=mesh)
     group = scene.groups[0]

@@ -24,7 +24,7 @@ SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 # Descent of the (sampled) objective, and what it does not imply across frames.
 
 
-def test_an_objective_that_falls_lets_the_energy_rise():
+def test_the_energy_may_rise_although_the_objective_falls():
     """A sheet of springs thrown through its own centre: all springs turn over within one frame.
 
     One spring with a = h^2 w / m gains the factor (1 + a/(1+a))^2 + a/(1+a)^2, between 1 and 4.
@@ -45,7 +45,7 @@ def _energy(scene, state):
     return potential + 0.5 * float(np.sum(scene.masses[:, None] * state.velocities**2))
 
 
-def test_what_is_not_sampled_moves_on_uniformly():
+def test_coordinates_without_sampled_stiffness_move_on_uniformly():
     """Coordinates in the kernel of the sampled stiffness are held by mass only: nothing bends them.
 
     The objective falls in every frame all the same, at a stiffness of 1e8 as well.
@@ -110,7 +110,7 @@ def _orthonormal(rng: np.random.Generator, n: int, r: int) -> np.ndarray:
 
 @pytest.mark.parametrize("separate", [False, True], ids=["shared", "by axis"])
 @given(seed=SEEDS, r=st.integers(1, 6), t=st.floats(1e-8, 1.0), times=st.integers(1, 9))
-def test_gain_bounds_the_error_of_a_regularised_solve(separate, seed, r, t, times):
+def test_the_deim_constant_bounds_the_error_of_a_regularised_solve(separate, seed, r, t, times):
     """sqrt(1 + m gain^2) of the best error, and t / (sigma^2 + t) of the part in the basis.
 
     A row is taken m ``times``; the projections are large there, so that m matters.
@@ -160,7 +160,7 @@ def test_equal_eigenvalues_rise_only_together(seed, multiplicity, size):
 
 
 @given(SEEDS, st.integers(1, 8), st.integers(1, 20))
-def test_a_bounded_gain_needs_its_share_of_the_elements(seed, r, count):
+def test_a_bounded_deim_constant_needs_a_minimum_share_of_the_elements(seed, r, count):
     """m >= e / (mu gain^2), mu the largest share of the modes in an element over the mean one."""
     rng = np.random.default_rng(seed)
     v = _orthonormal(rng, 60, r)
@@ -172,7 +172,7 @@ def test_a_bounded_gain_needs_its_share_of_the_elements(seed, r, count):
 
 
 @pytest.mark.parametrize("count", [1, 5, 20])
-def test_the_share_is_needed_exactly_where_modes_are_spread_evenly(count, rng):
+def test_evenly_spread_modes_need_exactly_the_minimum_share_of_the_elements(count, rng):
     """e blocks with orthonormal columns over sqrt(e): m of them have the gain sqrt(e / m)."""
     blocks = [_orthonormal(rng, 3, 3) / np.sqrt(20) for _ in range(20)]
     v = np.concatenate(blocks)

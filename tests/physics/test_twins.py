@@ -23,5 +23,5 @@ def floor(name: str) -> float:
 
 
 @pytest.mark.parametrize("name", WELL_POSED)
-def test_floor_stays_below_one_in_ten_thousand(name):
+def test_the_sensitivity_of_a_predictable_scene_stays_below_one_in_ten_thousand(name):
     assert floor(name) < 1e-4

@@ -91,7 +91,7 @@ def test_files_modules_and_commands_that_sources_name_exist() -> None:
         "{kind: x5y}",
     ],
 )  # fmt: skip
-def test_a_name_that_is_gone_is_found(span: str) -> None:
+def test_a_name_that_no_longer_exists_is_found(span: str) -> None:
     assert list(gone(span)) != []
 
 

@@ -36,7 +36,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_it_carries_the_package_and_the_files_that_it_reads(wheel: Path) -> None:
+def test_the_wheel_contains_the_package_and_the_files_that_it_reads(wheel: Path) -> None:
     with ZipFile(wheel) as archive:
         names = set(archive.namelist())
         for name in ("methods.yaml", "words.yaml", "new_scene.txt"):
@@ -107,7 +107,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return environment / "bin"
 
 
-def test_it_brings_the_packages_of_the_library_alone(wheel: Path) -> None:
+def test_the_wheel_requires_only_the_packages_of_the_library(wheel: Path) -> None:
     """And ``./reproduce`` installs those of the study, but no tools of the tests."""
     needed = needed_by(wheel)
     assert len(needed) < 30
@@ -123,7 +123,7 @@ def test_it_brings_the_packages_of_the_library_alone(wheel: Path) -> None:
     assert study.isdisjoint(tests)
 
 
-def test_installed_elsewhere_all_of_it_works_without_the_packages_of_the_study(
+def test_the_installed_wheel_works_without_the_packages_of_the_study(
     installed: Path, tmp_path: Path
 ) -> None:
     with pytest.raises(AssertionError, match="No module named 'snakemake'"):
@@ -138,7 +138,7 @@ def test_installed_elsewhere_all_of_it_works_without_the_packages_of_the_study(
 
 
 @pytest.mark.slow
-def test_installed_elsewhere_it_trains_a_model_and_runs_the_examples(
+def test_the_installed_wheel_trains_a_model_and_runs_the_examples(
     installed: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")

@@ -83,7 +83,7 @@ def run(checkout: Checkout, module: str, *words: str, cwd: Path | None = None) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", commands("./reproduce"))
-def test_a_run_is_planned(command, checkout):
+def test_every_command_of_the_pages_can_be_planned(command, checkout):
     words = shlex.split(command)[1:]
     if words[:1] in (["run"], ["--help"]):
         pytest.skip("the script itself: test_reproduce_script.py")

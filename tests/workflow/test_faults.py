@@ -80,7 +80,7 @@ def test_lost_rows_and_a_killed_job_are_named_and_made_again(undisturbed, sandbo
 
 
 @slow
-def test_a_run_that_is_killed_with_all_its_jobs(undisturbed, fresh):
+def test_a_run_that_was_killed_with_all_its_jobs_is_completed_by_the_next_run(undisturbed, fresh):
     """Half-written files and the locks of both programs are left, and nobody unlocks by hand."""
     for folder in ("fom", "snapshots", "pod", "reruns"):
         kill_all(_caught_writing(fresh, folder))
@@ -108,7 +108,7 @@ def _caught_writing(
     ],
     ids=["interrupted", "SIGHUP to all", "SIGTERM to the run alone"],
 )
-def test_a_run_that_is_ended_ends_its_jobs_and_goes_on(undisturbed, fresh, send, number, kind):
+def test_a_stopped_run_stops_its_jobs_and_can_be_continued(undisturbed, fresh, send, number, kind):
     process = _caught_writing(fresh, "fom", kind)
     send(process.pid, number)
     output, _ = process.communicate(timeout=60)
@@ -118,7 +118,7 @@ def test_a_run_that_is_ended_ends_its_jobs_and_goes_on(undisturbed, fresh, send,
 
 
 @slow
-def test_a_run_whose_fork_server_is_killed_says_so_and_goes_on(undisturbed, fresh):
+def test_a_run_whose_fork_server_is_killed_says_so_and_can_be_continued(undisturbed, fresh):
     process = _caught_writing(fresh, "fom", "hold")
     children = psutil.Process(process.pid).children()
     (server,) = (child for child in children if "forkserver" in " ".join(child.cmdline()))
@@ -130,7 +130,7 @@ def test_a_run_whose_fork_server_is_killed_says_so_and_goes_on(undisturbed, fres
 
 
 @slow
-def test_a_write_that_fails_on_a_full_disk(undisturbed, sandbox):
+def test_a_run_on_a_full_disk_fails_and_is_completed_by_the_next_run(undisturbed, sandbox):
     sandbox.path(TABLE).unlink()
     status, output = sandbox.run(TABLE, fault="full:reconstruction_error")
     assert status != 0
@@ -156,7 +156,7 @@ def copy_of_training(path: Path) -> None:
     shutil.copy2(path.with_name("train.h5"), path)
 
 
-def test_unfit_results_are_named_by_the_plan_and_made_again(undisturbed, sandbox):
+def test_damaged_results_are_named_by_the_plan_and_made_again(undisturbed, sandbox):
     """Several at once, though all that is made from them is there and younger."""
     other = f"{MICRO_RESULTS}/fom/spring_oop/heldout.h5"
     damages = {other: copy_of_training, SNAPSHOTS: Path.unlink, BASIS: cut}
@@ -185,7 +185,7 @@ def run_while_all_code_is_edited(sandbox: Sandbox, *targets: str) -> None:
     assert "Nothing to be done" in sandbox.snakemake("-n", *targets)[1]
 
 
-def test_a_job_does_not_notice_that_code_is_edited(fresh):
+def test_a_job_ignores_edits_of_the_code_during_the_run(fresh):
     """Every job but the first one that makes a mesh; there is no compiled code in them."""
     fresh.use_its_own_package()
     _, planned = fresh.snakemake("-n", "--verbose")
@@ -222,7 +222,7 @@ def _read_mesh(sandbox: Sandbox, wave: float = 0.0) -> None:
 
 
 @slow
-def test_a_changed_mesh_file_reruns_what_follows(tmp_path):
+def test_a_changed_mesh_file_reruns_the_jobs_that_depend_on_it(tmp_path):
     """Though the new file is older than the results, as after unpacking an archive."""
     first, second = (Sandbox.make(tmp_path / name) for name in ("first", "second"))
     for sandbox, wave in ((first, 0.0), (second, 0.1)):

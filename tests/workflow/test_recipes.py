@@ -97,7 +97,7 @@ def test_a_recipe_touches_few_files(title):
     assert 0 < len(paths) == len(set(paths)) <= MOST[title]
 
 
-def test_what_was_added_belongs_to_the_study(checkout):
+def test_the_added_files_belong_to_the_study(checkout):
     assert {
         f"{RESULTS}/figures/rest_shapes.png",
         f"{RESULTS}/tables/mesh_sizes.csv",
@@ -147,7 +147,7 @@ def test_the_added_code_makes_its_files(checkout, said):
 
 
 @pytest.mark.slow
-def test_the_group_has_the_properties_of_every_group(checkout):
+def test_the_added_group_has_the_properties_of_every_group(checkout):
     """The copy's own tests of groups, on the group that its list of groups names now."""
     program = ("-m", "pytest", "-p", "no:cacheprovider", "-k", "cable")
     done = checkout.looks(*GROUP_TESTS, program=program)

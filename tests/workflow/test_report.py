@@ -42,7 +42,7 @@ def go_to(page: Page, entry: str) -> None:
     page.get_by_role("link", name=entry, exact=True).click()
 
 
-def test_every_figure_opens(opened):
+def test_every_figure_of_the_report_opens(opened):
     go_to(opened, "Figures")
     rows = opened.locator("tbody tr")
     shown = [row.split()[0] for row in rows.all_inner_texts()]
@@ -53,7 +53,7 @@ def test_every_figure_opens(opened):
         opened.wait_for_function(f"[...document.images].some(i => i.naturalWidth === {width})")
 
 
-def test_the_other_pages_are_shown_nothing_is_asked_of_a_network_and_nothing_fails(opened):
+def test_the_report_opens_without_a_network_and_without_an_error(opened):
     """Tables have their titles, statistics are drawn."""
     go_to(opened, "Tables")
     text = opened.inner_text("body")

@@ -139,7 +139,7 @@ UNFIT = {
 
 
 @pytest.mark.parametrize("what", UNFIT)
-def test_what_does_not_fit_is_said_in_one_line_before_anything_is_made(what, folder):
+def test_an_unsuitable_machine_is_named_in_one_line_before_anything_is_installed(what, folder):
     change, words = UNFIT[what]
     change(folder)
     (line,) = folder.refused()
@@ -155,7 +155,7 @@ FAILING = {
 
 
 @pytest.mark.parametrize("what", FAILING)
-def test_a_failed_set_up_does_not_count_and_is_made_anew(what, folder):
+def test_a_failed_set_up_is_repeated(what, folder):
     name, text, words = FAILING[what]
     folder.touch(name, text)
     for _ in range(2):
@@ -165,7 +165,7 @@ def test_a_failed_set_up_does_not_count_and_is_made_anew(what, folder):
     folder.works()
 
 
-def test_no_network(folder):
+def test_a_set_up_without_a_network_is_named(folder):
     folder.python.unlink()
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
@@ -225,7 +225,7 @@ def test_only_the_tests_add_their_tools_and_only_where_one_is_missing(folder):
     assert adding == [added, [], [], added]
 
 
-def test_arguments_are_handed_on(folder):
+def test_arguments_are_passed_to_the_pipeline(folder):
     """The set-up shows that it is alive."""
     asked = (["-n", "results/figures/a b.pdf"], ["test", "-q", "tests/unit"], ["run", "true"], [])
     said = [folder.run(*arguments)[1] for arguments in asked]
@@ -248,7 +248,7 @@ def installing(folder: Folder) -> Iterator[tuple[Folder, subprocess.Popen[str]]]
     process.communicate(timeout=60)
 
 
-def test_the_second_of_two_set_ups_ends_at_once(installing):
+def test_a_second_set_up_ends_at_once_while_the_first_is_at_work(installing):
     folder, first = installing
     (line,) = folder.refused()
     assert line.startswith(f"pdrom: another run (process {first.pid}, making .venv) uses this")
@@ -262,7 +262,7 @@ def test_the_second_of_two_set_ups_ends_at_once(installing):
 @pytest.mark.parametrize(
     ("whole", "number"), [(True, signal.SIGINT), (True, signal.SIGHUP), (False, signal.SIGTERM)]
 )
-def test_a_set_up_that_a_signal_ends_says_so(installing, whole, number):
+def test_a_set_up_that_is_ended_by_a_signal_says_so(installing, whole, number):
     """It does not wait for the packages, which are no longer installed: the streams close."""
     folder, first = installing
     (os.killpg if whole else os.kill)(first.pid, number)

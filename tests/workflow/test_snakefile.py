@@ -87,7 +87,7 @@ def finished(finished_once: Checkout, plan: dict[str, Made]) -> Iterator[Checkou
         os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
 
 
-def test_a_fresh_clone_plans_the_whole_study_beside_a_run_and_starts_no_other(clean, monkeypatch):
+def test_a_fresh_clone_plans_the_complete_study_during_a_run_and_starts_none(clean, monkeypatch):
     """Tables and figures, and the manuscript in the end. This process holds the lock."""
     monkeypatch.chdir(clean.folder)
     descriptor = hold()
@@ -108,7 +108,7 @@ def test_a_fresh_clone_plans_the_whole_study_beside_a_run_and_starts_no_other(cl
     assert wanted | {"paper/main.pdf", "paper/supplement.pdf"} <= made
 
 
-def test_one_figure_needs_no_more_than_its_own_inputs(clean):
+def test_one_figure_needs_only_its_inputs(clean):
     """No table of the whole study, and of the scenes only the two that it draws."""
     figure = "results/figures/spring_runs.pdf"
     planned = clean.planned(figure)
@@ -121,7 +121,7 @@ def test_one_figure_needs_no_more_than_its_own_inputs(clean):
     assert _scenes(p for p in planned if _stage(p) in stages) == {"spring_stretch", "spring_twist"}
 
 
-def test_a_scene_outside_the_study_is_run_for_its_own_file(plan):
+def test_a_scene_outside_the_study_is_run_if_its_file_is_requested(plan):
     made = needed(plan, OUTSIDE)
     (mesh,) = (path for path in made if _stage(path) == "meshes")
     assert _below(mesh)[1].startswith("bar_")
@@ -135,7 +135,7 @@ def test_a_scene_outside_the_study_is_run_for_its_own_file(plan):
         (("--config", 'scenes=["../x"]'), "configuration (config/default.yaml): scenes.0 = '../x'"),
     ],
 )
-def test_what_nobody_makes_is_refused(arguments, words, clean):
+def test_a_file_that_no_rule_makes_is_refused(arguments, words, clean):
     assert words in only_line(clean.snakemake(*arguments).stderr)
     assert not (clean.folder / "results").exists()
 
@@ -182,7 +182,7 @@ def test_a_broken_file_ends_the_command_with_one_line(finished, path, own, words
 ENTRY = '    {\n        "fall": "pdrom.model.effects.forces:Gravity",\n'
 
 
-def test_no_text_and_no_date_reruns_anything(finished):
+def test_changed_texts_and_dates_rerun_no_job(finished):
     """Nor does another number of cores, a new name of an effect, or one that no scene lists.
 
     All sources are younger than the results, then all results are younger than now.
@@ -207,7 +207,7 @@ def replanned(checkout: Checkout, *edit: str) -> set[str]:
     return checkout.planned(*MICRO_ARGUMENTS)
 
 
-def test_the_edited_script_reruns_every_job(finished, plan):
+def test_an_edit_of_the_script_reruns_every_job(finished, plan):
     old, new = "code=snakemake.params.code", "code=str(snakemake.params.code)"
     wanted = [needed(plan, target) for target in (MICRO_MANUSCRIPT, PAGE, ARTICLE)]
     assert replanned(finished, SCRIPT, old, new) == set[str]().union(*wanted)
@@ -221,7 +221,7 @@ def test_the_edited_script_reruns_every_job(finished, plan):
     ],
     ids=["kernel", "effect that was listed"],
 )
-def test_an_edit_reruns_the_scene_that_it_concerns_and_what_follows(finished, edit, scene):
+def test_an_edit_of_a_scene_reruns_that_scene_and_the_files_made_from_it(finished, edit, scene):
     planned = replanned(finished, *edit)
     per_scene = {p for p in planned if _stage(p) not in SHARED}
     assert _scenes(per_scene) == {scene}
@@ -245,7 +245,7 @@ MAP = "src/study/figures/stability_map.py"
     ],
     ids=["threshold of a claim", "caption"],
 )
-def test_an_edit_reruns_what_shows_it_and_the_manuscript_only(finished, edit, files):
+def test_an_edit_of_a_text_reruns_only_files_that_show_it_and_the_manuscript(finished, edit, files):
     planned = replanned(finished, *edit)
     others = {path for path in planned if _stage(path) not in ("paper", "article")}
     assert others == {f"{MICRO_RESULTS}/{file}" for file in files}

@@ -40,7 +40,7 @@ def reduced(full: api.Run) -> api.Run:
     return api.train(full, method="block-deim", r=2).run(full.scene)
 
 
-def test_the_pages_example_runs_and_is_short(tmp_path, monkeypatch, capsys):
+def test_the_example_of_the_page_runs_and_is_short(tmp_path, monkeypatch, capsys):
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     assert len(code.strip().splitlines()) <= 15
     monkeypatch.chdir(tmp_path)
@@ -50,7 +50,7 @@ def test_the_pages_example_runs_and_is_short(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "errors.png").stat().st_size > 10_000
 
 
-def test_the_page_has_every_name_and_no_function_more():
+def test_the_page_lists_every_public_name_and_no_other_function():
     functions = {n for n in api.__all__ if n[0].islower()}
     assert (
         set(re.findall(r"`([a-z_]+)\(", PAGE.split("| name |")[1].split("| object |")[0]))
@@ -65,7 +65,7 @@ def test_the_page_has_every_name_and_no_function_more():
         assert {name for name in own if name[0] != "_"} <= set(re.findall(r"`(\w+)`", row)), row
 
 
-def test_a_run_is_that_of_the_step_loop(full):
+def test_a_run_has_the_positions_of_the_step_loop(full):
     assert np.array_equal(full.positions, trajectory(full.scene))
     assert full.ms.shape == (12,)
     group = full.scene.group("spring")
@@ -73,7 +73,7 @@ def test_a_run_is_that_of_the_step_loop(full):
     assert len(training_frames(12, 6)) == 6
 
 
-def test_files_are_read_back(full, reduced, tmp_path):
+def test_saved_runs_are_loaded_unchanged(full, reduced, tmp_path):
     blown = replace(reduced, positions=full.positions[:4], ms=full.ms[:3], blowup_frame=3)
     for run in (full, reduced, blown):
         api.save(run, tmp_path / "run.h5")

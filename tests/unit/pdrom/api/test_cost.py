@@ -34,7 +34,7 @@ def counting(monkeypatch):
     monkeypatch.setattr(MODULE, "timed", counted)
 
 
-def test_a_table_has_settings_of_own_and_coarser_grids_and_of_a_model_cheapest_first(tmp_path):
+def test_a_cost_table_lists_settings_of_all_grids_and_of_a_model_the_fastest_first(tmp_path):
     model = api.train(api.run(sheet()), modes=10)
     table = api.cost(sheet(iterations=4), models=[model])
     assert table.columns.tolist() == [
@@ -61,7 +61,7 @@ def test_a_table_has_settings_of_own_and_coarser_grids_and_of_a_model_cheapest_f
         api.cost(sheet(size=7), models=[tmp_path / "own.h5"])
 
 
-def test_two_coarser_meshes_estimate_the_error_of_the_mesh():
+def test_two_coarser_meshes_estimate_the_discretisation_error():
     fine, tolerance = sheet(size=13, frames=20), (1e-6, 20_000)
     meshes = coarser.grids(fine, (0.5, 0.25))
     runs = [mesh.converged(*tolerance) for mesh in meshes]
@@ -72,7 +72,7 @@ def test_two_coarser_meshes_estimate_the_error_of_the_mesh():
     assert set(one.vertices) == {169, 16}
 
 
-def test_a_body_that_is_rigid_or_blows_up_has_no_such_errors_one_at_rest_no_table(monkeypatch):
+def test_a_rigid_body_has_no_deformation_error_a_diverged_one_an_infinite_error(monkeypatch):
     assert api.cost(sheet(GRAVITY, SPRING)).deformation_error.isna().all()
     with pytest.raises(SceneError, match="there is nothing to reduce"):
         api.cost(sheet(LEFT, SPRING))
@@ -83,7 +83,7 @@ def test_a_body_that_is_rigid_or_blows_up_has_no_such_errors_one_at_rest_no_tabl
     assert len(plot_cost(table).axes[0].texts) == 0
 
 
-def test_a_grid_that_an_effect_does_not_suit_is_left_out(caplog):
+def test_a_coarser_grid_on_which_an_effect_is_impossible_is_left_out(caplog):
     place = sheet(size=13).mesh.points[6 + 13]  # none of the grid with a quarter of the cells
     near = np.array([0.01, 1.0, 0.01])
     box = {"kind": "box", "lower": list(place - near), "upper": list(place + near)}
@@ -92,7 +92,7 @@ def test_a_grid_that_an_effect_does_not_suit_is_left_out(caplog):
     assert "of the cells along a side: scene 'test', effect 'pins': selection" in caplog.text
 
 
-def test_files_are_read_as_the_mesh_of_the_scene(tmp_path):
+def test_mesh_files_are_read_with_the_settings_of_the_scene(tmp_path):
     fine, coarse = cloth(7, 5, wave=0.25), cloth(4, 3, wave=0.25)
     for name, mesh in (("fine", fine), ("coarse", coarse)):
         made = meshio.Mesh(1e3 * mesh.points, [("triangle", mesh.triangles)])

@@ -48,7 +48,7 @@ def model(full) -> api.Model:
     ],
     ids=["weight", "handle", "release and floor", "obstacle", "kick and damping"],
 )  # fmt: skip
-def test_all_columns_and_elements_are_the_full_order(full, effects):
+def test_a_model_of_all_columns_and_elements_repeats_the_full_order_run(full, effects):
     """Same local-global iterations; weights, masses, forces, holds and the time step differ."""
     every = api.train(full, basis=np.eye(30), tolerance=None, converged=False)
     other = scene(*effects, time_step=0.011, vertex_mass=3.0, iterations=7)
@@ -74,7 +74,7 @@ def test_the_validation_has_the_errors_of_every_trajectory_and_of_replaying(full
         assert words in shown
 
 
-def test_training_frames_have_converged_unless_asked_otherwise():
+def test_training_frames_are_converged_steps_unless_requested_otherwise():
     stiff = LEFT, SPRING | {"weight": 1e6}
     exact, full = (api.run(scene(*stiff, iterations=k)).positions[-1] for k in (1000, 3))
     one = api.run(scene(*stiff, iterations=3))
@@ -86,7 +86,7 @@ def test_training_frames_have_converged_unless_asked_otherwise():
     assert left[0] < 0.1 * left[1]
 
 
-def test_the_tolerance_bounds_the_residual_and_a_missed_one_is_said(full, model):
+def test_the_tolerance_bounds_the_residual_and_a_violated_tolerance_is_reported(full, model):
     (kept,) = model.reduced.samples.values()
     assert kept.residual <= model.training.tolerance == 0.01
     assert model.training.residual == kept.residual
@@ -100,7 +100,7 @@ def test_the_tolerance_bounds_the_residual_and_a_missed_one_is_said(full, model)
     assert "violates the tolerance 0.01" in repr(few)
 
 
-def test_the_smallest_model_within_an_error_is_returned_or_the_best_is_named(full):
+def test_the_smallest_model_within_an_error_is_returned_or_the_most_accurate_is_named(full):
     found = api.train(full, validate=1, error=0.9, converged=False)
     assert found.reduced.columns.modes == 20
     with pytest.raises(NotReducibleError, match=r"error = 1e-06; the best has \d0 modes"):
@@ -109,13 +109,13 @@ def test_the_smallest_model_within_an_error_is_returned_or_the_best_is_named(ful
         api.train(full, error=0.1)
 
 
-def test_a_model_that_blows_up_in_validation_is_not_within_an_error(full, monkeypatch):
+def test_a_model_that_diverges_in_validation_satisfies_no_requested_error(full, monkeypatch):
     monkeypatch.setattr("pdrom.api.model.BLOWUP_EXTENT", 1e-3)
     with pytest.raises(NotReducibleError, match=r"errors inf .* blew up"):
         api.train(full, validate=1, error=0.9, converged=False)
 
 
-def test_arguments_that_another_one_makes_meaningless_are_refused(full, model):
+def test_an_argument_that_another_argument_overrides_is_refused(full, model):
     reduced = model.run(full.scene)
     blown = replace(full, positions=full.positions[:4], ms=full.ms[:3], blowup_frame=3)
     for words, runs, keys in (
@@ -134,7 +134,7 @@ def test_arguments_that_another_one_makes_meaningless_are_refused(full, model):
             api.train(*runs, **keys)
 
 
-def test_speeds_are_of_all_frames_and_a_file_holds_a_model_of_a_rigid_body(tmp_path):
+def test_speed_is_measured_on_all_frames_and_a_model_of_a_rigid_body_is_saved(tmp_path):
     rigid = api.build_scene(effects=[GRAVITY, SPRING], mesh=MESH, frames=4)
     model = api.train(api.run(rigid), modes=4)
     assert model.training.residual == 0.0  # there are no equations to fit
@@ -169,7 +169,7 @@ NOTHING = {  # effects, frames, group, message
 
 
 @pytest.mark.parametrize("name", NOTHING)
-def test_nothing_to_reduce_is_said_in_words(name):
+def test_a_run_without_anything_to_reduce_is_refused_with_the_reason(name):
     effects, frames, group, words = NOTHING[name]
     full = api.run(api.build_scene(effects=[*effects, SPRING], mesh=MESH, frames=frames))
     for asked in {group, group or "spring"}:
@@ -190,7 +190,7 @@ def test_skinning_columns_and_several_runs_enlarge_the_space(full):
     assert errors[1] < errors[0]
 
 
-def test_only_holds_of_the_training_or_declared_ones_are_taken(full, model):
+def test_only_fixed_vertices_of_the_training_or_declared_ones_are_accepted(full, model):
     right = scene({"effect": "pins", "select": "right"}, SPRING)
     with pytest.raises(NotReducibleError, match="effect 'pins': holds right, but no training"):
         model.run(right)
@@ -215,7 +215,7 @@ def test_another_mesh_and_other_groups_are_refused(full, model):
         api.train(full, api.run(faulty["another mesh than that of the training"]))
 
 
-def test_runs_are_compared_with_runs_of_their_mesh_and_times_only(full, model):
+def test_a_run_is_compared_only_with_runs_of_the_same_mesh_and_times(full, model):
     for words, other in {
         "another mesh": scene(mesh=MESH | {"rows": 7}),
         "another time step": scene(time_step=0.01),
@@ -230,7 +230,7 @@ def test_runs_are_compared_with_runs_of_their_mesh_and_times_only(full, model):
     assert model.run(full.scene).error(full).position < 0.3
 
 
-def test_a_file_gives_the_model_with_the_same_bits(full, model, tmp_path):
+def test_a_saved_model_is_loaded_bit_for_bit(full, model, tmp_path):
     gappy = api.train(full, method="gappy", r=3, validate=1)
     for own in (model, gappy):
         own.save(tmp_path / "a.model.h5")
@@ -242,7 +242,7 @@ def test_a_file_gives_the_model_with_the_same_bits(full, model, tmp_path):
         assert np.array_equal(api.load(tmp_path / "run.h5").positions, two.positions)
 
 
-def test_a_file_that_cannot_be_trusted_is_refused(model, tmp_path):
+def test_a_model_file_of_another_format_or_without_a_model_is_refused(model, tmp_path):
     path = tmp_path / "a.model.h5"
     with pytest.raises(StorageError, match="no such file"):
         api.load_model(path)
@@ -261,8 +261,8 @@ def test_a_file_that_cannot_be_trusted_is_refused(model, tmp_path):
         api.load(path)
 
 
-def test_the_files_page_computes_a_frame_with_numpy_alone(model, tmp_path, monkeypatch):
-    """The script beside the page of the library, of at most 40 lines."""
+def test_the_script_of_the_page_computes_a_frame_with_numpy(model, tmp_path, monkeypatch):
+    """The script next to the page of the library, of at most 40 lines."""
     script = (ROOT / "docs" / "frame_of_a_model.py").read_text("utf-8")
     assert len(script.strip().splitlines()) <= 40
     monkeypatch.chdir(tmp_path)
@@ -273,7 +273,7 @@ def test_the_files_page_computes_a_frame_with_numpy_alone(model, tmp_path, monke
     assert names["positions"] == pytest.approx(expected, abs=1e-12)
 
 
-def test_models_of_converged_frames_run_by_newton_steps_others_as_the_full_order(full, model):
+def test_models_of_converged_frames_run_by_newton_steps_others_by_local_global(full, model):
     slow = model.run(full.scene, iterations=2000, solver="local_global")
     assert model.run(full.scene).error(slow).deformation < 1e-3
     loose = api.train(full, modes=8, converged=False)
@@ -281,7 +281,7 @@ def test_models_of_converged_frames_run_by_newton_steps_others_as_the_full_order
     assert np.array_equal(one.positions, two.positions)
 
 
-def test_a_loop_computes_the_frames_of_a_run_and_moves_its_holds(full, model):
+def test_a_loop_computes_the_frames_of_a_run_and_moves_its_fixed_vertices(full, model):
     loop, moved = model.start(full.scene), model.start(full.scene)
     run, held = model.run(full.scene).positions, full.scene.boundaries[0].vertices
     for expected, hold in zip(run[1:4], ("left", "x_min", "pins"), strict=True):
@@ -301,14 +301,14 @@ def test_a_loop_computes_the_frames_of_a_run_and_moves_its_holds(full, model):
             moved.move(hold, shift)
 
 
-def test_a_page_names_the_key_that_adds_a_group_it_lacks(tmp_path):
+def test_the_page_of_a_model_names_the_key_that_adds_a_missing_group(tmp_path):
     sheet = {"effect": "strain", "young": 1e6, "poisson": 0.3, "thickness": 1e-3}
     model = api.train(api.run(scene(LEFT, sheet)), modes=4, converged=False)
     with pytest.raises(PdromError, match=r"no 'area' .added by poisson"):
         model.view(tmp_path / "page.html")
 
 
-def test_threads_get_the_runs_alone(full, model):
+def test_reduced_runs_in_threads_equal_runs_one_after_the_other(full, model):
     other = scene(LEFT, SPRING, KICK)
     alone = [model.run(s).positions for s in (full.scene, other)]
     with ThreadPoolExecutor(4) as pool:
@@ -317,7 +317,7 @@ def test_threads_get_the_runs_alone(full, model):
         assert np.array_equal(run.result().positions, alone[i % 2])
 
 
-def test_projections_of_a_group_are_another_kind_of_model(full):
+def test_a_model_may_reduce_the_projections_of_one_group(full):
     rank = api.basis(full, "spring").rank
     best, poor = (api.train(full, method="pod", r=r) for r in (rank, 1))
     errors = [m.run(full.scene).error(full).position for m in (best, poor)]

@@ -28,7 +28,7 @@ def test_a_uniform_velocity_gives_the_closed_formula_of_free_flight():
 
 
 @pytest.mark.parametrize("group", ["spring", "strain", "bending", "deformation_gradient"])
-def test_a_run_that_goes_on_is_the_uninterrupted_one_bit_for_bit(group, tmp_path):
+def test_a_continued_run_equals_the_uninterrupted_run_bit_for_bit(group, tmp_path):
     """With holds that began before and end later, contacts, forces, and from a file."""
     effects = GRAVITY, VELOCITY, HANDLE, ENDING, BALL, {"effect": group, "weight": 1e4}
     keys = {"mesh": GROUPS[group], "anderson_window": 3 * (group == "spring")}
@@ -43,7 +43,7 @@ def test_a_run_that_goes_on_is_the_uninterrupted_one_bit_for_bit(group, tmp_path
     assert np.allclose(api.load(tmp_path / "rest.h5").ms[:5], whole.ms[:5], rtol=1e-12)
 
 
-def test_another_scene_goes_on_from_a_run_and_says_so(tmp_path):
+def test_a_run_of_another_scene_continues_a_run_and_records_it(tmp_path):
     """A hold that the first run has not begins where its vertices are then."""
     first, own = api.run(scene(GRAVITY, VELOCITY, SPRING)), scene(SPRING, ENDING)
     found, bottom = api.run(own, start=first, frame=6), own.boundaries[0].vertices
@@ -56,7 +56,7 @@ def test_another_scene_goes_on_from_a_run_and_says_so(tmp_path):
         api.train(found)
 
 
-def test_a_run_goes_on_only_on_its_mesh_and_from_a_frame_of_it():
+def test_a_run_is_continued_only_on_the_same_mesh_and_from_one_of_its_frames():
     first, longer = api.run(scene(SPRING)), {"frames": 20}
     points, triangles = first.scene.mesh.points, first.scene.mesh.triangles
     for words, keys, frame in (
@@ -78,7 +78,7 @@ def test_a_run_goes_on_only_on_its_mesh_and_from_a_frame_of_it():
      ({"effect": "poke", "over": 8, "count": 1}, "'poke' begins before frame 5"),
      (VELOCITY, "'velocity' acts at frame 0 only, .* remove it")],
 )  # fmt: skip
-def test_a_motion_that_should_have_begun_before_a_run_goes_on_is_refused(effect, words):
+def test_a_prescribed_motion_that_begins_before_the_continued_frame_is_refused(effect, words):
     first = api.run(scene(SPRING, {**HANDLE, "offset": [0, 0, 1]}))
     with pytest.raises(ConfigurationError, match=words):
         api.run(scene(SPRING, effect), start=first, frame=5)

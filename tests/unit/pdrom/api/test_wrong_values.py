@@ -65,7 +65,7 @@ ARGUMENTS = [
 
 
 @pytest.mark.parametrize(("name", "key"), ARGUMENTS)
-def test_an_argument(known, tmp_path, monkeypatch, capfd, name, key):
+def test_wrong_arguments_give_a_result_or_one_line(known, tmp_path, monkeypatch, capfd, name, key):
     monkeypatch.chdir(tmp_path)
     function, right = getattr(api, name), dict(known)
     if name in ("cost", "run"):
@@ -94,7 +94,7 @@ def use(run: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", ["run", "snapshots"])
-def test_a_field(known, tmp_path, monkeypatch, capfd, kind):
+def test_wrong_fields_of_a_run_give_a_result_or_one_line(known, tmp_path, monkeypatch, capfd, kind):
     monkeypatch.chdir(tmp_path)
     full = known["full"]
     record, tried = full, use
@@ -112,7 +112,9 @@ def test_a_field(known, tmp_path, monkeypatch, capfd, kind):
 
 
 @pytest.mark.parametrize("argument", ["scene", "out", "on_frame", "iterations", "solver", "path"])
-def test_an_argument_of_a_models_methods(known, tmp_path, monkeypatch, capfd, argument):
+def test_a_wrong_argument_of_a_model_gives_a_result_or_one_line(
+    known, tmp_path, monkeypatch, capfd, argument
+):
     monkeypatch.chdir(tmp_path)
     model, scene = known["model"], known["full"].scene
     if argument == "path":

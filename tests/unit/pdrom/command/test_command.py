@@ -107,7 +107,7 @@ def reads_of(name: str) -> list[list[str]]:
     return [[*TRAIN, name], ["view", name], ["view", name, "--unchecked"], ["show", name]]
 
 
-def test_a_run_is_read_wherever_it_was_copied(folder, finished, capsys):
+def test_a_run_is_read_in_whichever_folder_its_copy_lies(folder, finished, capsys):
     shutil.copy(finished / "small.h5", "copy.h5")
     shutil.copy(finished / "small.h5", "no suffix")
     for name in ("copy.h5", "no suffix"):
@@ -120,7 +120,7 @@ def test_a_run_is_read_wherever_it_was_copied(folder, finished, capsys):
 
 
 @pytest.mark.parametrize("name", ["x.h5", "x.txt", "x", "x.csv", "own.h5"])
-def test_a_file_of_others_is_never_moved_changed_or_removed(folder, name, capsys):
+def test_a_file_of_the_user_is_never_moved_changed_or_removed(folder, name, capsys):
     Path(name).write_bytes(b"somebody's own\n")
     if name == "own.h5":
         h5py.File(name, "w").create_dataset("numbers", data=[1.0]).file.close()
@@ -139,7 +139,7 @@ def test_a_damaged_run_is_refused_and_left_where_it_is(folder, finished, capsys)
     assert content(folder) == before
 
 
-def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished, capsys):
+def test_a_run_without_a_checksum_is_read_only_with_the_option_for_it(folder, finished, capsys):
     whole = (finished / "small.h5").read_bytes()[BLOCK:]
     Path("small.h5").write_bytes(whole)
     before = content(folder)
@@ -155,7 +155,7 @@ def test_a_run_without_a_checksum_is_read_if_that_is_asked_for(folder, finished,
     assert told.startswith("pdrom: small.h5: holds no complete run")
 
 
-def test_a_table_is_shown_with_what_its_columns_hold(folder, capsys):
+def test_a_table_is_shown_with_the_meaning_of_its_columns(folder, capsys):
     (folder / "t.csv").write_text("scene,component,none\na,1,\nb,3,\n")
     assert run(["show", "t.csv"]) == Status.DONE
     said = capsys.readouterr().out
@@ -217,7 +217,7 @@ def test_an_open_seam_is_named_and_merged(folder, capsys, caplog):
         assert "100 frames of 4 vertices (1 connected part)" in capsys.readouterr().out
 
 
-def test_a_new_scene_tells_of_its_mesh(folder, capsys):
+def test_a_new_scene_describes_its_mesh(folder, capsys):
     """Also where a quote is in the name of the mesh, and the scene lies in another folder."""
     (folder / "in").mkdir()
     mesh = cloth(4, 3, "xz", lift=-7.0)
@@ -236,7 +236,7 @@ def test_a_new_scene_tells_of_its_mesh(folder, capsys):
 
 @pytest.mark.parametrize("mesh", [cloth(4, 3, "xz", extent=200.0), bar(3, 2, 2, extent=0.01)])
 @pytest.mark.parametrize("up", [0, 1, 2])
-def test_a_new_scene_has_a_material_and_lengths_of_its_mesh_and_its_floor_is_below(up, mesh):
+def test_a_new_scene_has_a_material_lengths_of_its_mesh_and_a_floor_below_it(up, mesh):
     """Water or cotton; what the pins are carried by is half the extent."""
     text = template("a", "a.obj", mesh, up="xyz"[up])
     scene = Scene.build(SceneConfig.model_validate(yaml.safe_load(text)), mesh)
@@ -250,7 +250,7 @@ def test_a_new_scene_has_a_material_and_lengths_of_its_mesh_and_its_floor_is_bel
     assert depths(floor, mesh.points + np.eye(3)[up]) == pytest.approx(below - 1.0)
 
 
-def test_a_new_sheet_sags_alike_if_it_is_refined():
+def test_a_new_sheet_sags_by_the_same_length_on_a_refined_mesh():
     """Hanging, damped until it rests, each frame iterated to less than 1 %."""
     keys, sags = yaml.safe_load(template("a")), []
     keys["effects"] += [{"effect": "damping", "rate": 10.0}, {"effect": "pins", "select": "top"}]
@@ -285,7 +285,7 @@ SECTIONS = {
 
 
 @pytest.mark.parametrize("form", SECTIONS)
-def test_words_of_a_scene_are_shown_with_their_keys_and_defaults(form, capsys):
+def test_kinds_of_effects_are_shown_with_their_keys_and_defaults(form, capsys):
     texts, fields = read_yaml(CONFIG / "words.yaml"), SECTIONS[form].model_fields
     word = form.split()[-1]
     assert texts.keys() == SECTIONS.keys()
@@ -325,7 +325,7 @@ FAULTY = [
 ]
 
 
-def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, capsys):
+def test_foreign_files_and_the_mesh_of_the_scene_are_not_overwritten(folder, capsys):
     Path("mine.h5").write_bytes(b"mine")
     Path("m.obj").write_bytes(b"v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n# " + MARK)
     assert run(["new", "own.yaml", "--mesh", "m.obj"]) == Status.DONE
@@ -340,7 +340,7 @@ def test_files_of_others_and_the_mesh_of_the_scene_are_not_overwritten(folder, c
 
 
 @pytest.mark.parametrize(("arguments", "words"), FAULTY)
-def test_what_is_not_there_or_cannot_be_written_is_found_before_anything_runs(
+def test_missing_inputs_and_unwritable_outputs_are_reported_before_a_run_begins(
     folder, arguments, words, monkeypatch, capsys
 ):
     def called(*_: object, **__: object) -> None:
@@ -370,19 +370,19 @@ def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
         ("pdrom show none.yaml >&-", 1, "pdrom: none.yaml: no such file\n"),
     ],
 )
-def test_an_output_that_nobody_reads_is_no_traceback(folder, command, status, said):
+def test_a_closed_output_gives_no_traceback(folder, command, status, said):
     done = shell(command, folder)
     assert (done.returncode, done.stderr) == (status, said)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
-def test_an_output_that_cannot_be_written_is_one_line(folder):
+def test_an_output_that_cannot_be_written_gives_one_line(folder):
     done = shell("pdrom show small.yaml > /dev/full", folder)
     assert done.returncode == Status.FAULTY
     assert done.stderr == "pdrom: standard output: No space left on device\n"
 
 
-def test_faults_that_a_run_meets_are_told(folder, finished, capsys):
+def test_errors_during_a_run_are_reported(folder, finished, capsys):
     assert run(["run", "small.yaml", "--out", "nowhere.d/../small.yaml/x.h5"]) == Status.FAULTY
     assert "cannot be written" in capsys.readouterr().err.splitlines()[-1]
     shutil.copy(finished / "small.h5", folder)
@@ -391,7 +391,7 @@ def test_faults_that_a_run_meets_are_told(folder, finished, capsys):
     assert "not a run of" in refusal(capsys, [*TRAIN, "small.h5"])
 
 
-def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):
+def test_a_diverged_run_has_a_distinct_exit_code(folder, monkeypatch, capsys):
     assert run(TRAIN) == Status.DONE
     monkeypatch.setattr("pdrom.api.model.BLOWUP_EXTENT", 1e-3)
     assert run(["run", "small.yaml", "--model", "small.model.h5"]) == Status.BLEW_UP
@@ -404,7 +404,7 @@ def test_a_blow_up_has_a_code_of_its_own(folder, monkeypatch, capsys):
     [("", ""), ("trian", "'train'"), ("run", ""), ("train x --r a", ""),
      ("train x --group g --modse", "'--modes'")],
 )  # fmt: skip
-def test_what_is_not_understood_has_code_2(arguments, meant, capsys):
+def test_unknown_arguments_exit_with_code_2(arguments, meant, capsys):
     with pytest.raises(SystemExit) as caught:
         run(arguments.split())
     assert caught.value.code == 2
@@ -412,7 +412,7 @@ def test_what_is_not_understood_has_code_2(arguments, meant, capsys):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help_has_an_example(name, capsys):
+def test_the_help_of_a_command_has_an_example(name, capsys):
     with pytest.raises(SystemExit) as caught:
         run([name, "--help"])
     assert caught.value.code == 0
@@ -422,7 +422,7 @@ def test_help_has_an_example(name, capsys):
     assert parser().parse_args(example).perform
 
 
-def test_an_interrupt_is_said(folder, monkeypatch, capsys):
+def test_an_interrupt_is_reported_in_one_line(folder, monkeypatch, capsys):
     def interrupted(*arguments, **named):
         raise KeyboardInterrupt
 
@@ -431,14 +431,14 @@ def test_an_interrupt_is_said(folder, monkeypatch, capsys):
     assert capsys.readouterr().err == "\npdrom: interrupted\n"
 
 
-def test_the_module_is_the_program(tmp_path):
+def test_python_m_pdrom_is_the_program(tmp_path):
     done = shell("pdrom new x", tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert shell("pdrom --version", tmp_path).stdout == f"pdrom {__version__}\n"
     assert (tmp_path / "x.yaml").is_file()
 
 
-def test_threads_and_kernels_of_numpy_are_set_before_it_is_loaded():
+def test_threads_and_kernels_are_set_before_numpy_is_loaded():
     code = "import sys, pdrom.command.main; sys.exit('numpy' in sys.modules)"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     assert subprocess.run([sys.executable, "-c", code], env=environment).returncode == 0

@@ -24,7 +24,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_settings_are_printed_and_drawn_with_meshes_and_models_of_files(folder, capsys):
+def test_the_cost_table_of_mesh_and_model_files_is_printed_and_drawn(folder, capsys):
     full = api.run(api.load_scene("scenes/small.yaml"))
     api.train(full, modes=6, converged=False).save("own.h5")
     asked = ["cost", "scenes/small.yaml", "--coarser", "coarse.obj", "--model", "own.h5"]

@@ -62,7 +62,7 @@ def test_the_page_the_picture_and_the_files_for_paraview_have_all_runs(runs, tmp
     assert [path.name for path in tmp_path.rglob(".*")] == []
 
 
-def test_files_for_paraview_replace_and_remove_only_their_own(runs, tmp_path, capsys):
+def test_files_for_paraview_replace_and_remove_only_files_for_paraview(runs, tmp_path, capsys):
     frames = tmp_path / "vtk"
     view = ["view", files(runs)[0], "--out", str(tmp_path / "p.html"), "--vtk", str(frames)]
     assert run(view) == run(view) == Status.DONE
@@ -111,7 +111,7 @@ AT = "snapshots/spring/frames"
         ("small_small", lambda f: f.attrs.modify("blowup_frame", 3), "blow-up in frame 3"),
     ],
 )
-def test_a_right_checksum_does_not_make_a_run_sound(runs, tmp_path, name, change, words):
+def test_wrong_content_with_a_valid_checksum_is_refused(runs, tmp_path, name, change, words):
     path = tmp_path / "run.h5"
     shutil.copy(runs / f"{name}.h5", path)
     with h5py.File(path, "r+") as file:

@@ -9,7 +9,7 @@ from pdrom.core import machine as module
 from pdrom.core.machine import loaded_kernels, machine
 
 
-def test_it_names_threads_cores_processor_and_libraries():
+def test_the_record_names_threads_cores_processor_and_libraries():
     for threads in (2, 1):
         with threadpool_limits(limits=threads):
             record = machine()
@@ -19,7 +19,7 @@ def test_it_names_threads_cores_processor_and_libraries():
     assert record.libraries["numpy"] == version("numpy")
 
 
-def test_kernels_are_those_that_are_loaded():
+def test_the_record_names_the_kernels_that_are_loaded():
     """NumPy and SciPy have a library each, and nothing says where they lie on the disk."""
     kernels = loaded_kernels()
     pools = threadpool_info()

@@ -19,7 +19,7 @@ def configuration_hash(configuration: object) -> str:
 @pytest.mark.parametrize(
     "other", [{"a": 2, "b": [1, 2]}, {"a": 1, "b": [2, 1]}, {"a": 1}, {"a": "1", "b": [1, 2]}]
 )
-def test_hash_depends_on_every_value_and_not_on_the_order_of_keys(other):
+def test_the_hash_depends_on_every_value_and_not_on_the_order_of_keys(other):
     reference = configuration_hash({"a": 1, "b": [1, 2]})
     assert configuration_hash({"b": [1, 2], "a": 1}) == reference
     assert configuration_hash(other) != reference

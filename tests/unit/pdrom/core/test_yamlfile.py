@@ -46,7 +46,7 @@ def written(tmp_path, content: str | bytes):
     return path
 
 
-def test_reads_plain_yaml(tmp_path):
+def test_plain_yaml_is_read(tmp_path):
     path = written(tmp_path, "a: 1\nb: [1.5, x, null]\nc: {d: true}\n")
     assert read_yaml(path) == {"a": 1, "b": [1.5, "x", None], "c": {"d": True}}
     # a byte order mark is no part of the text
@@ -76,7 +76,7 @@ ODD = "20:0 1_0 06 010 08 0x1F 0b11 -1_0.5 .5_0 1e0_5 1:30.5 !!int~'010' {b:~[7,
 
 
 @pytest.mark.parametrize("value", [value.replace("~", " ") for value in ODD.split()])
-def test_a_number_that_yaml_reads_as_another_is_named_as_it_is_written(tmp_path, value):
+def test_a_number_that_yaml_would_change_is_named_as_written(tmp_path, value):
     words = r"file\.yaml: aa(\.b\.1)? = [^ ]*[\d_F]+: YAML reads it as .*; write a decimal number"
     with pytest.raises(ConfigurationError, match=words):
         read_yaml(written(tmp_path, f"aa: {value}\n"))
@@ -137,7 +137,7 @@ def test_faults_name_source_key_and_what_is_allowed(data, message):
         validate(Outer, data, "source")
 
 
-def test_bytes_are_counted_not_letters():
+def test_a_file_name_is_limited_in_bytes_not_in_letters():
     check_lengths("a/" + 255 * "b")
     check_lengths("a/" * 2000)
     for path, words in ((128 * "é", f"at most {MAX_NAME} bytes"), (2048 * "a/", str(MAX_PATH))):

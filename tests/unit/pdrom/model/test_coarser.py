@@ -22,7 +22,7 @@ def solid(*effects: dict, **settings: object):
     return make_scene(GRAVITY, BODY, *effects, mesh=BAR, **settings)
 
 
-def test_grids_keep_the_box_the_mass_and_its_centre_the_finest_first():
+def test_coarser_grids_keep_box_mass_and_centre_and_are_sorted_from_the_finest():
     scene = solid(masses=MASSES)
     made = coarser.grids(scene, (0.25, 0.5, 1.0, 2.0))
     assert [each.scene.mesh.vertices for each in made] == [5 * 3 * 3, 3 * 3 * 3]
@@ -36,7 +36,7 @@ def test_grids_keep_the_box_the_mass_and_its_centre_the_finest_first():
     assert coarser.grids(given, (0.5,)) == []
 
 
-def test_states_go_to_the_coarse_mesh_and_back_if_the_motion_is_affine(rng):
+def test_affine_states_are_exact_on_the_coarse_mesh_and_back(rng):
     scene = solid()
     (made,) = coarser.grids(scene, (0.5,))
     slope, shift = rng.standard_normal((3, 3)), rng.standard_normal(3)
@@ -82,13 +82,13 @@ FLAT = replace(SHORT, tetrahedra=np.vstack([SHORT.tetrahedra, [[0, 1, 2, 2]]]))
     ],
     ids=["as fine", "surface", "millimetres", "finer along x", "degenerate"],
 )
-def test_a_mesh_that_is_no_coarser_one_is_refused(mesh, fault):
+def test_a_mesh_that_is_not_coarser_is_refused(mesh, fault):
     with pytest.raises(PdromError, match=f"scene 'test': the coarser mesh.*{fault}"):
         coarser.on_mesh(solid(), mesh)
 
 
 @pytest.mark.parametrize("order", [0.6, 2.9, 0.3, 3.5, -1.0, None])
-def test_the_error_of_a_mesh_is_exact_for_powers_of_its_spacing(order, rng):
+def test_the_estimated_mesh_error_is_exact_for_powers_of_the_spacing(order, rng):
     """Of orders .5 to 3; others, and a body at rest, tell none."""
     moves, error = rng.standard_normal((2, 4, 10, 3))
     moves[0] = error[0] = 0.0
@@ -100,6 +100,6 @@ def test_the_error_of_a_mesh_is_exact_for_powers_of_its_spacing(order, rng):
     assert coarser.mesh_error(spacings, runs) == (exact and pytest.approx(exact))
 
 
-def test_spacings_of_two_meshes_of_a_body_have_the_ratio_of_their_edges():
+def test_spacings_of_two_meshes_have_the_ratio_of_their_edges():
     for fine, coarse in ((bar(9, 9, 9), bar(5, 5, 5)), (cloth(9, 9), cloth(5, 5))):
         assert coarser.spacing(coarse) == pytest.approx(2.0 * coarser.spacing(fine))

@@ -17,7 +17,7 @@ def sheet(group: str = "spring", **settings):
     return make_scene(*effects, mesh=SHEET, **settings)
 
 
-def test_the_limit_ends_the_search_and_is_reported(rng):
+def test_the_limit_of_evaluations_ends_the_minimisation_and_is_reported(rng):
     scene = sheet()
     loop = ConvergedStepper(scene, scene.system, 1e-14, 3)
     loop.step(scene.initial_state(), 0)
@@ -26,7 +26,7 @@ def test_the_limit_ends_the_search_and_is_reported(rng):
 
 
 @pytest.mark.parametrize("group", ["spring", "strain"])
-def test_a_frame_ends_where_very_many_iterations_end(group, rng):
+def test_a_converged_frame_equals_very_many_iterations(group, rng):
     scene = sheet(group)
     state = scene.initial_state(0.02 * rng.standard_normal(scene.mesh.points.shape))
     best = ConvergedStepper(scene, scene.system, 1e-11, 2000)

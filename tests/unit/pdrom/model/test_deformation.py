@@ -41,7 +41,7 @@ def test_the_best_rotation_is_no_worse_than_any_other(bent, rng):
     assert found <= min(sums) * (1 + 1e-9)
 
 
-def test_a_vertex_that_is_split_in_two_changes_nothing(bent, rng):
+def test_splitting_a_vertex_in_two_changes_no_deformation_error(bent, rng):
     rest, shapes, masses = bent
     run = shapes + 0.1 * rng.standard_normal(shapes.shape)
     twice = np.append(np.arange(30), 7)
@@ -52,7 +52,7 @@ def test_a_vertex_that_is_split_in_two_changes_nothing(bent, rng):
     assert found == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_rigid_reference_has_no_error_and_large_numbers_none_of_their_own(bent, rng):
+def test_a_rigid_reference_has_no_error_and_large_coordinates_add_none(bent, rng):
     rest, shapes, masses = bent
     rigid = moved(np.broadcast_to(rest, shapes.shape), rng)
     assert deformation_error(shapes, rigid + 1e-5, rest, masses) is None
@@ -64,7 +64,7 @@ def test_a_rigid_reference_has_no_error_and_large_numbers_none_of_their_own(bent
 
 
 @pytest.mark.parametrize("flat", [[1.0, 1.0, 1.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-def test_affine_residuals_are_those_of_least_squares_and_none_for_an_affine_image(bent, rng, flat):
+def test_affine_residuals_are_those_of_least_squares_and_zero_for_an_affine_map(bent, rng, flat):
     rest, shapes, masses = bent
     rest = rest * flat
     shapes[0] = rest @ rng.standard_normal((3, 3)) + [1.0, 2.0, 3.0]

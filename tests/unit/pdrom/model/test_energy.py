@@ -14,7 +14,7 @@ from strategies import SEEDS
 SPRING = {"effect": "spring", "weight": 1e4}
 
 
-def test_the_full_order_run_has_ratio_one(group_scene):
+def test_the_full_order_run_has_energy_ratio_one(group_scene):
     """Whatever the group, and whether or not the initial state or a later one has the most."""
     scene = with_effects(group_scene, GRAVITY)
     run = trajectory(scene)
@@ -43,7 +43,7 @@ def test_a_state_at_rest_has_the_energy_of_its_springs():
     np.testing.assert_allclose(energies(scene, positions), expected, rtol=1e-12)
 
 
-def test_a_run_that_gains_energy_has_a_ratio_above_one_infinite_on_overflow():
+def test_a_run_of_growing_energy_has_a_ratio_above_one_infinite_on_overflow():
     scene = make_scene(SPRING, GRAVITY, TOP, frames=12)
     run, rest = trajectory(scene), scene.mesh.points
     scale = EnergyScale.of(scene, run)
@@ -77,12 +77,12 @@ def test_relative_errors_agree_with_norms_of_matrices_and_have_no_unit(seed, uni
         (0.0, 0.0, [None] * 4),
     ],
 )
-def test_round_off_has_no_error(rng, size, level, expected):
+def test_a_group_of_rounding_errors_has_no_relative_error(rng, size, level, expected):
     p = rng.standard_normal((6, 8, 3)) * size
     assert relative_errors(p, 0.9 * p, level) == pytest.approx(expected)
 
 
-def test_trajectory_error_weighs_frames_by_their_motion():
+def test_the_trajectory_error_weighs_frames_by_their_displacement():
     assert trajectory_error(np.array([3.0, 4.0]), np.array([6.0, 8.0])) == 0.5
     assert trajectory_error(np.zeros(3), np.ones(3)) == 0.0
     # a run at rest has none

@@ -22,7 +22,7 @@ def changed(scene, motion):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_every_scene_has_different_motions_of_its_own_length_and_groups(name):
+def test_every_scene_has_different_trajectories_of_its_length_and_groups(name):
     scene = read_scene(ROOT, name)
     variants = [scene, *map(scene.heldout_variant, MOTIONS)]
     assert all(a.effects != b.effects for i, a in enumerate(variants) for b in variants[:i])
@@ -30,7 +30,7 @@ def test_every_scene_has_different_motions_of_its_own_length_and_groups(name):
                for v in variants)  # fmt: skip
 
 
-def test_what_the_motions_change():
+def test_each_trajectory_changes_the_effects_that_the_rule_names():
     twist, sheet = read_scene(ROOT, "bar_twist"), read_scene(ROOT, "spring_oop")
     assert changed(twist, "heldout") == {"rotate", "gravity"}
     assert changed(twist, "kick") == {"rotate", "gravity", "kick"}
@@ -49,7 +49,7 @@ def test_what_the_motions_change():
 
 
 @pytest.mark.parametrize("name", ["spring_oop", "bar_twist", "strain_stretch_twin"])
-def test_playback_of_the_training_motion_misses_them(name):
+def test_replaying_the_training_trajectory_misses_the_test_trajectories(name):
     scene = read_scene(ROOT, name)
     mesh = scene.mesh.build(ROOT)
     training = trajectory(Scene.build(scene, mesh), track_objective=False)
@@ -60,7 +60,7 @@ def test_playback_of_the_training_motion_misses_them(name):
 
 @pytest.mark.parametrize("own", [(0.0, -9.81, 0.0), (0.0, 0.0, 9.81), (3.0, -9.0, 1.0)])
 @pytest.mark.parametrize(("degrees", "place"), TILTS.values())
-def test_gravity_keeps_its_size_and_turns_towards_an_axis(own, degrees, place):
+def test_gravity_of_a_test_trajectory_keeps_its_size_and_turns_towards_an_axis(own, degrees, place):
     turned = np.array(Gravity.Config(acceleration=own).tilted(degrees, [0, 1], place).acceleration)
     size = np.linalg.norm(own)
     assert np.linalg.norm(turned) == pytest.approx(size)
@@ -71,7 +71,7 @@ def test_gravity_keeps_its_size_and_turns_towards_an_axis(own, degrees, place):
         assert turned[2] == 0.0
 
 
-def test_pins_that_share_vertices_are_carried_together_but_not_apart():
+def test_pins_that_share_vertices_are_carried_only_if_they_start_together():
     scene = read_scene(ROOT, "cloth_all_oop")
     mesh, left = scene.mesh.build(ROOT), scene.effects[2]
     front = left.model_copy(update={"select": "front", "until": 50})
@@ -86,7 +86,7 @@ def test_pins_that_share_vertices_are_carried_together_but_not_apart():
 @pytest.mark.parametrize(
     "name", ["spring_oop", "bar_twist", "bend_fall", "cloth_all", "starfish_twist"]
 )
-def test_further_training_motions_are_none_of_the_held_out_ones_and_all_can_be_built(name):
+def test_further_training_trajectories_are_no_test_trajectories_and_can_be_built(name):
     """Schedules that follow each other still do: no vertex is held in two places."""
     scene = read_scene(ROOT, name)
     made = [scene.training_variant(seed) for seed in range(1, 5)]

@@ -89,7 +89,7 @@ def test_a_run_writes_neither_to_its_scene_nor_to_another_run(effect, kind):
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_threads_get_the_runs_alone(effect):
+def test_runs_in_threads_equal_runs_one_after_the_other(effect):
     scene = scene_with(effect)
     alone, group = api.run(scene), scene.groups[-1].name
     model = api.train(alone, group=group, r=3)
@@ -103,7 +103,7 @@ def test_threads_get_the_runs_alone(effect):
         np.testing.assert_array_equal(other.result().positions, reduced.positions)
 
 
-def test_a_group_of_a_scene_refuses_what_belongs_to_a_run():
+def test_a_group_of_a_scene_refuses_data_of_a_run():
     (group,) = make_scene({"effect": "bending", "weight": 1.0}, mesh=GROUPS["bending"]).groups
     for call in (group.begin_frame, group.project, lambda y: group.accumulate(y, y.copy())):
         with pytest.raises(RuntimeError, match="bending: a scene's group has no frame"):

@@ -29,7 +29,7 @@ def test_unlisted_groups_leave_no_matrix_entry():
     assert scene.forces == scene.boundaries == scene.contacts == scene.starts == []
 
 
-def test_needed_snapshots_alone_are_stored_as_projections_of_the_last_iterate(tmp_path):
+def test_only_needed_snapshots_are_stored_as_projections_of_the_last_iterate(tmp_path):
     """Replay the frames and project at the last local iterate."""
     scene = make_scene(GRAVITY, TOP, SPRING, {"effect": "strain", "weight": 1e5}, frames=5)
     run(scene, tmp_path / "run.h5", {"strain": np.array([0, 3])})
@@ -62,7 +62,7 @@ def test_explicit_drag_beyond_its_stability_limit_is_refused():
         make_scene(SPRING, {"effect": "damping", "rate": 125.0})
 
 
-def test_later_entries_change_what_they_select():
+def test_later_entries_change_the_vertices_that_they_select():
     entries = [{"select": "top", "vertex_mass": 5.0}, {"select": [0], "vertex_mass": 7.0}]
     scene = make_scene(SPRING, vertex_mass=3.0, masses=entries)
     top = scene.mesh.points[:, 1] == scene.mesh.points[:, 1].max()
@@ -78,7 +78,7 @@ def test_later_entries_change_what_they_select():
         ("tetrahedron_strain", {"kind": "bar", "nx": 4, "ny": 3, "nz": 3, "extent": 2.0}),
     ],
 )
-def test_a_density_weighs_the_rest_shape(effect, mesh):
+def test_a_density_gives_masses_by_area_or_volume_of_the_rest_shape(effect, mesh):
     """Total mass is density times area or volume; vertices inside have more than corners."""
     scene = make_scene({"effect": effect, "weight": 1.0}, mesh=mesh, masses=[{"density": 0.25}])
     sides = np.ptp(scene.mesh.points, axis=0)
@@ -96,7 +96,7 @@ def scene_with(group, *factors, weight=1e4):
 
 
 @pytest.mark.parametrize("group", GROUPS)
-def test_elements_inside_are_multiplied_and_others_left_alone(group):
+def test_factors_multiply_weights_of_selected_elements_and_no_others(group):
     """All elements times a factor run as with the product as weight, through compiled kernels."""
     plain, changed = scene_with(group), scene_with(group, {"select": BOX, "factor": 7.0})
     inside = changed.mesh.points[:, 0] <= 0.1 + 1e-6

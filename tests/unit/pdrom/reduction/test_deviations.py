@@ -32,7 +32,7 @@ def errors(measure: Yardstick, positions: np.ndarray, end: int = FRAMES) -> dict
 FLOOR = {"effect": "floor", "height": 1.5}
 
 
-def test_the_full_order_run_has_no_error_and_one_that_ended_early_none_at_all():
+def test_the_full_order_run_has_error_zero_and_a_diverged_run_none():
     measure = yardstick(FLOOR)
     found = errors(measure, measure.reference)
     assert tuple(found) == ERRORS
@@ -44,7 +44,7 @@ def test_the_full_order_run_has_no_error_and_one_that_ended_early_none_at_all():
         assert set(errors(measure, measure.reference[:left]).values()) == {None}
 
 
-def test_a_rigid_motion_is_an_error_of_positions_and_half_the_speed_one_of_velocities():
+def test_a_rigid_motion_is_a_position_error_and_half_the_speed_a_velocity_error():
     """Half the motion has half the norms of the full order; a rigid motion leaves the shape."""
     measure = yardstick(FLOOR)
     moved = measure.reference @ random_rotation(np.random.default_rng(3)).T + [0.3, 0.1, -0.2]
@@ -59,7 +59,7 @@ def test_a_rigid_motion_is_an_error_of_positions_and_half_the_speed_one_of_veloc
 
 
 @pytest.mark.parametrize("end", [11, FRAMES])
-def test_both_errors_cover_the_same_frames_and_masses_count_in_shapes(rng, end):
+def test_position_and_deformation_errors_cover_the_same_frames_and_weigh_masses(rng, end):
     measure = yardstick(FLOOR, masses=[{"select": "left", "vertex_mass": 90.0}])
     scene, own = measure.scene, measure.reference
     run, limit = own + rng.normal(scale=0.01, size=(2, *own.shape))
@@ -82,7 +82,7 @@ def test_energy_drift_of_a_run_that_stands_still():
     assert found["energy_drift"] > 0.1
 
 
-def test_blocks_of_frames_do_not_matter(monkeypatch):
+def test_errors_do_not_depend_on_the_blocks_of_frames(monkeypatch):
     measure = yardstick(FLOOR)
     positions = measure.reference + np.random.default_rng(1).normal(
         scale=0.01, size=measure.reference.shape

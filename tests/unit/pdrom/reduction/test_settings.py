@@ -27,7 +27,7 @@ def truth(scene) -> Yardstick:
     return Yardstick(scene, found)
 
 
-def test_every_mesh_has_every_count_with_its_labels(scene):
+def test_every_mesh_has_every_number_of_iterations_with_its_labels(scene):
     meshes = coarser.grids(scene, (0.8, 0.6))
     made = list(settings.full_order(scene, [(2, 0), (5, 3)], [None, *meshes]))
     names = ["projective", "anderson", "coarser-mesh", "coarser-mesh-anderson", "coarser-mesh"]
@@ -42,7 +42,7 @@ def test_every_mesh_has_every_count_with_its_labels(scene):
     assert made[2].run(8, 1.0) == pytest.approx(np.stack(own), abs=1e-14)
 
 
-def test_a_converged_setting_has_no_error_more_iterations_less_and_a_blow_up_none(
+def test_errors_fall_with_iterations_to_zero_and_a_diverged_setting_has_none(
     scene, truth, monkeypatch
 ):
     counts = [(1, 0), (5, 0), (1000, 0)]
@@ -54,7 +54,7 @@ def test_a_converged_setting_has_no_error_more_iterations_less_and_a_blow_up_non
     assert settings.loop_of({}, scene).errors(truth) == (None, None, None)
 
 
-def test_a_model_of_all_columns_is_the_full_order_and_newton_the_converged_step(scene, truth):
+def test_a_model_of_all_columns_equals_the_full_order_run_or_the_converged_step(scene, truth):
     columns = make_columns([scene], truth.reference[1:], 0, 0, np.eye(scene.mesh.vertices), ())
     model = SubspaceModel(columns)
     five, exact = (reduced({}, scene, model, *how) for how in ((5, False), (None, True)))
@@ -63,7 +63,7 @@ def test_a_model_of_all_columns_is_the_full_order_and_newton_the_converged_step(
     assert five.output is not None
 
 
-def test_a_setting_is_timed_from_states_of_all_vertices_in_its_own_unknowns(scene):
+def test_a_setting_is_timed_in_its_unknowns_from_states_of_all_vertices(scene):
     (mesh,) = coarser.grids(scene, (0.6,))
     setting = settings.loop_of({"method": "x"}, mesh.scene, mesh, steps=2)
     state = scene.initial_state()

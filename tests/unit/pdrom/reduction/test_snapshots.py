@@ -31,7 +31,7 @@ def test_training_and_test_frames_are_disjoint_and_spread(frames, data):
     np.testing.assert_array_equal(stored, sorted({*train.tolist(), *test.tolist()}))
 
 
-def test_a_vertex_hands_out_its_mass_in_equal_parts_to_its_elements(group_scene, rng):
+def test_the_mass_of_a_vertex_is_divided_equally_among_its_elements(group_scene, rng):
     """All rows of an element have the element's mass; no mass of a touched vertex is left."""
     group = group_scene.groups[0]
     masses = rng.uniform(0.5, 2.0, group_scene.mesh.vertices)
@@ -60,7 +60,7 @@ def collected(runs, frames=TRAIN, **paths):
     return snapshots.collect(files["train"], files["held"], scene.groups[0], scene.masses, frames)
 
 
-def test_splits_hold_their_frames(runs):
+def test_the_training_and_test_snapshots_hold_their_frames(runs):
     scene, folder = runs
     group, got = scene.groups[0], collected(runs)
     np.testing.assert_array_equal(got.frames["train"], TRAIN)
@@ -80,7 +80,7 @@ def test_splits_hold_their_frames(runs):
     assert (got.elements, got.rows_per_element) == (group.elements, 1)
 
 
-def test_file_round_trip(runs, tmp_path):
+def test_snapshots_are_read_as_they_were_written(runs, tmp_path):
     got = collected(runs)
     snapshots.save_snapshots(got, tmp_path / "s.h5")
     np.testing.assert_equal(vars(snapshots.load_snapshots(tmp_path / "s.h5")), vars(got))

@@ -39,7 +39,7 @@ def variant(name, calls, totals, frames=1, **settings) -> Variant:
     return Variant({"name": name}, loop, START, frames)
 
 
-def test_variants_take_turns_and_start_afresh():
+def test_timed_variants_take_turns_and_start_from_the_same_state():
     calls = []
     measure([variant("a", calls, [1.0] * 9, 2), variant("b", calls, [1.0] * 9, 1)], 1, 2)
     assert calls == [("a", 0, 0.0), ("a", 1, 1.0), ("b", 0, 0.0)] * 3
@@ -57,9 +57,7 @@ def test_variants_take_turns_and_start_afresh():
         ([9.0, 2.0, 3.0, 1.0, 9.0, 3.0, 1.0, 2.0, 9.0], 3, 0, 3, 2.0),
     ],
 )
-def test_the_median_repeat_of_each_frame_counts_with_its_own_phases(
-    times, frames, warmup, repeats, mean
-):
+def test_the_median_repeat_of_a_frame_counts_with_its_phases(times, frames, warmup, repeats, mean):
     (result,) = measure([variant("a", [], times, frames)], warmup=warmup, repeats=repeats)
     assert result["name"] == "a"
     assert result["ms_per_frame"] == pytest.approx(1e3 * mean)
@@ -68,7 +66,7 @@ def test_the_median_repeat_of_each_frame_counts_with_its_own_phases(
     assert result["assembly_ms"] == 0.0
 
 
-def test_assembly_is_taken_out_of_the_local_step_and_phases_add_up():
+def test_assembly_is_subtracted_from_the_local_step_and_phases_add_up():
     assembling = SimpleNamespace(assembly_seconds=77.0)
     steps = [assembling, SimpleNamespace(assembly_seconds=77.0, lift_seconds=55.0)]
     (result,) = measure([variant("a", [], [0.1] * 4, 2, local_steps=steps)], warmup=1, repeats=1)
@@ -80,7 +78,7 @@ def test_assembly_is_taken_out_of_the_local_step_and_phases_add_up():
     assert result["ms_per_frame"] == pytest.approx(100.0)
 
 
-def test_a_part_of_the_iterations_stands_for_all():
+def test_times_of_some_iterations_are_extrapolated_to_all():
     """Inertia is paid once a frame, the other phases with every iteration."""
     clock = Clock("a", [], seconds(1.0))
     (result,) = measure([Variant({}, clock, START, 1, share=0.25)], 0, 1)
@@ -89,7 +87,7 @@ def test_a_part_of_the_iterations_stands_for_all():
     ]
 
 
-def test_the_positions_of_all_vertices_are_part_of_a_frame():
+def test_the_time_of_a_frame_includes_the_positions_of_all_vertices():
     """They are made after the two steps of a frame; frames may begin at states along a run."""
     made, calls, times = [], [], seconds(1.0, 1.0, 1.0, 1.0)
     show, starts = (lambda y: made.append(y[0, 0])), ((START, 5), (START, 9))
@@ -105,13 +103,13 @@ def test_the_positions_of_all_vertices_are_part_of_a_frame():
     assert [frame for _, frame, _ in calls] == [5, 6, 5, 6, 9, 10]
 
 
-def test_calls_take_turns():
+def test_timed_calls_take_turns():
     calls = []
     times = measure_calls({"a": lambda: calls.append("a"), "b": lambda: calls.append("b")}, 1, 3)
     assert calls == list(times) * 4 == ["a", "b"] * 4
 
 
-def test_a_run_that_blows_up_is_timed_up_to_there():
+def test_a_diverged_run_is_timed_up_to_its_last_frame():
     calls = []
     (result,) = measure([variant("a", calls, [1.0, 3.0, 100.0], 3, bad_frame=1)], 0, 1)
     assert [frame for _, frame, _ in calls] == [0, 1]

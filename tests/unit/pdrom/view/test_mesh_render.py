@@ -18,7 +18,7 @@ CAMERAS = [Camera(), Camera(0.0, 0.0), Camera(-120.0, 60.0), Camera(90.0, -30.0)
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_camera_is_a_rotation_with_its_direction_up(camera):
+def test_a_camera_is_a_rotation_with_the_given_direction_up(camera):
     assert np.allclose(camera.basis @ camera.basis.T, np.eye(3))
     assert np.linalg.det(camera.basis) == pytest.approx(1.0)
     up = [0.0, np.cos(np.radians(camera.elevation))]
@@ -31,7 +31,7 @@ def test_front_camera_sees_x_right_and_z_near():
     assert camera.depth(point)[0] == pytest.approx(4.0)
 
 
-def test_nearest_face_covers_the_others():
+def test_the_nearest_face_covers_the_others():
     corners = [[0, 0], [1, 0], [0, 1]]
     points = np.array([[x, y, z] for z in (1, 0) for x, y in corners], dtype=float)
     mesh, colours = Mesh(points, np.arange(6).reshape(2, 3)), np.array([to_rgb("r"), to_rgb("b")])
@@ -59,7 +59,7 @@ def test_normals_are_unit_or_zero():
     assert np.allclose(normals, [[0, 0, 1], [0, 0, 0]])
 
 
-def test_outline_of_sheet_and_bar():
+def test_the_outlines_of_a_sheet_and_a_bar_are_their_edges():
     """Wherever they are; of the box its twelve edges, with 3 and twice 2 segments."""
     for mesh, count in ((cloth(4, 5), 2 * (3 + 4)), (bar(4, 3, 3), 4 * (3 + 2 + 2))):
         here = np.random.default_rng(0).standard_normal(mesh.points.shape)
@@ -78,14 +78,14 @@ def test_the_silhouette_of_a_round_body_is_a_closed_line_around_it():
 
 
 @pytest.mark.parametrize(("shift", "drawn"), [(0.0, 0), (-1.5, 2)])
-def test_floor_is_drawn_only_in_view(shift, drawn):
+def test_a_floor_is_drawn_only_in_view(shift, drawn):
     mesh, camera, ax = cloth(4, 4, lift=2.0), Camera(), Figure().subplots()
     points = mesh.points + np.array([0.0, shift, 0.0])
     mesh_render.draw_floor(ax, points, mesh, camera, window_of(camera, [points]))
     assert len(ax.collections) == drawn
 
 
-def test_windows():
+def test_a_window_contains_its_points_and_keeps_a_bounded_aspect():
     window = Window(0.0, 2.0, 0.0, 1.0)
     assert list(window.contains(np.array([[1.0, 0.5], [3.0, 0.5]]))) == [True, False]
     assert bounds(np.array([[0.0, 0.0], [2.0, 1.0]]), 0.0) == window

@@ -26,7 +26,7 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_all_elements_are_computed_as_in_pdrom_and_no_run_is_shown_unless_given(folder, tmp_path):
+def test_the_page_computes_all_elements_as_pdrom_and_shows_a_run_only_if_given(folder, tmp_path):
     full, out = api.load(folder / "a.h5"), tmp_path / "b.html"
     model = api.train(full, modes=6, tolerance=None)
     model.view(out)
@@ -38,7 +38,7 @@ def test_all_elements_are_computed_as_in_pdrom_and_no_run_is_shown_unless_given(
     assert model.reduced.columns.B @ z == pytest.approx(found.positions, abs=1e-9)
 
 
-def test_what_no_page_shows_is_refused_by_name(folder, tmp_path, capsys):
+def test_models_that_no_page_can_show_are_refused(folder, tmp_path, capsys):
     full, ball = (api.run(make_scene(*EFFECTS, *more, **SHEET)) for more in ((), (BALL,)))
     model, out = api.load_model(folder / "a.model.h5"), tmp_path / "b.html"
     projections = api.train(full, method="gappy", r=2), None, "a page cannot run"
@@ -55,7 +55,7 @@ def test_what_no_page_shows_is_refused_by_name(folder, tmp_path, capsys):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("width", "address"), [(1280, ""), (400, "#plain"), (400, '?nosuch"%')])
-def test_the_shape_fills_the_canvas_has_wires_and_goes_with_its_handle(folder, width, address):
+def test_the_shape_fills_the_canvas_has_wires_and_follows_its_handle(folder, width, address):
     def handle():  # row and column of its first point
         seen = picture(canvas)
         return np.argwhere(seen[..., 2] - seen[..., 0] > 100)[0].astype(float)

@@ -32,7 +32,7 @@ def unpack_positions(packed: dict[str, Any]) -> np.ndarray:
 
 
 @given(st.integers(1, 4), st.integers(1, 5), st.floats(1e-6, 1e6), st.integers(0, 2**32 - 1))
-def test_positions_survive_packing_to_half_a_step(frames, vertices, size, seed):
+def test_packed_positions_are_accurate_to_half_a_step(frames, vertices, size, seed):
     positions = size * np.random.default_rng(seed).normal(size=(frames, vertices, 3))
     positions[..., 2] = 0.5 * size  # a sheet without thickness
     found = unpack_positions(pack_positions(positions))
@@ -70,7 +70,7 @@ def viewed(
     )  # fmt: skip
 
 
-def test_the_surface_alone_is_packed_and_few_frames():
+def test_only_the_surface_and_few_frames_are_packed():
     mesh = bar(6, 4, 4)
     positions = np.repeat(mesh.points[None], 3 * FRAMES, axis=0)
     packed = pack_scene(ViewedScene("bar", "Bar", mesh, 0.01, positions, None))
@@ -181,7 +181,7 @@ def differ(first: np.ndarray, second: np.ndarray) -> bool:
 
 
 @pytest.mark.slow
-def test_a_page_that_was_cut_says_so(tmp_path: Path) -> None:
+def test_a_truncated_page_says_so(tmp_path: Path) -> None:
     path = tmp_path / "cut.html"
     write_page([viewed()], path)
     whole = path.read_text("utf-8")
@@ -193,7 +193,7 @@ def test_a_page_that_was_cut_says_so(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_runs_frames_obstacles_and_another_gravity_are_seen_without_a_network(
+def test_runs_frames_obstacles_and_the_direction_up_are_seen_without_a_network(
     tmp_path: Path,
 ) -> None:
     """The sheet is lit, and the same shape is another picture if up is another direction."""

@@ -168,14 +168,14 @@ def write_study(folder: Path) -> dict[str, object]:
     }
 
 
-def test_a_cell_of_another_type_is_named_before_the_manuscript_is_made(tmp_path, monkeypatch):
+def test_a_cell_of_a_wrong_type_is_named_before_the_manuscript_is_made(tmp_path, monkeypatch):
     infinite = TABLES["claims_tests"].assign(satisfied=float("inf"))
     monkeypatch.setitem(TABLES, "claims_tests", infinite)
     with pytest.raises(StorageError, match=r"'satisfied'.*row 1: 'inf'"):
         write_study(tmp_path)
 
 
-def test_unreliable_times_are_not_printed_and_the_manuscript_says_so(tmp_path, monkeypatch):
+def test_the_manuscript_omits_unreliable_times_and_says_so(tmp_path, monkeypatch):
     columns = "control_low control_high processor_share"
     for share in (1.0, 0.5):
         folder = tmp_path / f"{share}"
@@ -266,7 +266,7 @@ def rows_at(path: Path, key: str) -> int:
     return len(matching(table_at(path), [part.groups() for part in parts if part]))
 
 
-def test_each_number_is_the_pdfs_and_leads_to_the_cells_that_it_was_rounded_from(small):
+def test_each_number_equals_that_of_the_pdf_and_links_to_its_cells(small):
     """The numbers of the macros, in order, and the rows of the page that a link opens."""
     origins = json.loads((small.parent / "inputs" / "numbers.json").read_text(encoding="utf-8"))
     numbers, seen = {number["key"]: number for number in origins["numbers"].values()}, set()
@@ -288,7 +288,7 @@ def test_each_number_is_the_pdfs_and_leads_to_the_cells_that_it_was_rounded_from
     assert seen == {key for key, number in numbers.items() if number["rows"]}
 
 
-def test_a_made_table_leads_to_its_rows(small):
+def test_a_table_of_the_manuscript_links_to_its_rows(small):
     rows = [link for link in Links(small / "index.html").links if "row=" in link[1]]
     assert [(a, w) for _, a, w in rows] == [
         ("tables/payoff.html#row=1", r"1.5\cdot 10^{-4}"),
@@ -315,7 +315,7 @@ RUNS = frame("scene group error", ("a_b", "x_y", 0.0123), ("a_b", "z", 0.25), ("
         ("d & z & 3.4 (3.1 to 3.6) (loses)", "group=z", "3.4 (3.1 to 3.6) (loses)"),
     ],
 )
-def test_numbers_lead_to_the_rows_that_agree_in_what_both_tables_have(cells, key, number):
+def test_numbers_link_to_rows_that_agree_in_the_common_columns(cells, key, number):
     table = [("llr", ["scene", "group", "error"]), cells.split(" & ")]
     made = linked_table(table, {"other": pd.DataFrame({"scene": ["c"]}), "runs": RUNS})
     assert f"{f'runs|{key}'.encode().hex()}}}{{{number}}}" in made
@@ -328,7 +328,7 @@ def study_or_small(small: Path) -> list[Path]:
     return [small, *([made] if (made / "index.html").is_file() else [])]
 
 
-def test_every_link_leads_somewhere(small):
+def test_every_link_has_a_target(small):
     for pages in study_or_small(small):
         found = {path: Links(path) for path in pages.resolve().rglob("*.html")}
         links = [(path, *link) for path, page in found.items() for link in page.links]
@@ -385,7 +385,7 @@ def test_references_have_the_numbers_of_the_pdf(small, tmp_path):
     assert ("claim", "claims.html#C1", "C1") in Links(small / "index.html").links
 
 
-def test_a_reference_to_nothing_is_named(tmp_path):
+def test_a_reference_to_a_missing_label_is_named(tmp_path):
     given, path = write_study(tmp_path), tmp_path / "paper" / "main.tex"
     write_text(path.read_text("utf-8").replace(r"\ref{thm:s}", r"\ref{thm:lost}"), path)
     with pytest.raises(PaperError, match="label thm:lost, which does not exist"):
@@ -393,14 +393,14 @@ def test_a_reference_to_nothing_is_named(tmp_path):
     assert not (tmp_path / "article" / "index.html").exists()
 
 
-def test_what_the_study_does_not_hold_is_left_out(small):
+def test_blocks_about_results_that_the_study_lacks_are_left_out(small):
     text, claims = ((small / f"{page}.html").read_text("utf-8") for page in ("index", "claims"))
     shown = {words: words in text for words in ("Shown, ", "Full.", "Left out", "lacking")}
     assert shown == {"Shown, ": True, "Full.": True, "Left out": False, "lacking": False}
     assert "(implementation: numpy, compiled)" in claims
 
 
-def test_the_same_bytes_again(small, tmp_path):
+def test_the_article_is_made_with_the_same_bytes_again(small, tmp_path):
     again = write_pages(write_study(tmp_path), tmp_path)
     for path in (p for p in again.rglob("*") if p.is_file() and p.name[0] != "."):
         assert path.read_bytes() == (small / path.relative_to(again)).read_bytes(), path.name

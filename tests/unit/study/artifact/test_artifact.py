@@ -47,7 +47,7 @@ SETTINGS = {"section": Whole(factor=2.0), "factor": 3.0}
 STUDY = SimpleNamespace(value=lambda key, labels: SETTINGS[key])
 
 
-def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
+def test_a_job_runs_from_plain_data_and_records_its_provenance(tmp_path):
     source, out = str(tmp_path / "a" / "s.csv"), str(tmp_path / "c" / "s.csv")
     write_table(pd.DataFrame({"x": [1.0, 2.0]}), source)
     settings = multiplied.settings(STUDY, {"scene": "s"})
@@ -59,7 +59,7 @@ def test_a_job_runs_from_plain_data_and_says_what_made_it(tmp_path):
     assert "multiplied" in checksum_path(Path(out)).read_text()
 
 
-def test_a_job_depends_on_as_much_of_a_section_as_its_function_asks_for():
+def test_a_job_depends_only_on_the_keys_of_a_section_that_its_function_reads():
     settings = multiplied.settings(STUDY, {"scene": "s"})
     assert multiplied.plain(settings) == {"section": {"factor": 2.0}}
     assert list(modules_in(settings)) == ["pdrom.model.effects.forces"]

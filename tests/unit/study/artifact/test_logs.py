@@ -46,7 +46,7 @@ def test_messages_of_the_package_are_in_the_log_of_the_last_job(path):
     assert "pdrom: used " in last
 
 
-def test_in_a_job_alone_libraries_have_one_thread_and_damaged_results_are_set_aside(path):
+def test_only_jobs_limit_libraries_to_one_thread_and_rename_damaged_results(path):
     """Snakemake sets as many as the job claims, and timing jobs claim every core."""
 
     def threads() -> set[int]:
@@ -84,7 +84,7 @@ def test_a_failed_job_ends_with_one_line(path, failure, said):
         assert "test_logs.py" in path.read_text()
 
 
-def test_warnings_of_the_planning_are_shown_once(capsys):
+def test_warnings_of_a_plan_are_shown_once(capsys):
     for stream in (sys.stderr, None):
         with warnings_to(stream):
             logging.getLogger("pdrom.anything").warning("look")
@@ -92,7 +92,7 @@ def test_warnings_of_the_planning_are_shown_once(capsys):
     assert capsys.readouterr().err == "pdrom: warning: look\n"
 
 
-def test_processor_time_and_memory_are_those_of_the_process_and_of_what_it_started():
+def test_usage_covers_the_process_and_the_processes_that_it_started():
     start = time.monotonic()
     before = usage_since(start)
     held = np.ones(8_000_000)  # 64 MB
@@ -104,7 +104,7 @@ def test_processor_time_and_memory_are_those_of_the_process_and_of_what_it_start
     assert after.memory >= held.nbytes / 1e6
 
 
-def test_a_job_that_failed_has_no_usage(tmp_path):
+def test_the_log_of_a_failed_job_has_no_usage(tmp_path):
     with pytest.raises(SystemExit), job_log(str(tmp_path / "job.log")):
         raise MeshError("a.obj: vertex 3 is nan")
     (tmp_path / "empty.log").touch()

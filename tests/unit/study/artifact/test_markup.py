@@ -12,7 +12,7 @@ def test_names_and_formulas_of_a_caption_become_tex():
     )
 
 
-def test_settings_are_filled_in():
+def test_settings_are_inserted_into_a_caption():
     settings = {"a.b": 1e-10}
     assert filled("up to {a.b} of", settings.__getitem__) == "up to $10^{-10}$ of"
     assert number(0.1) == "$0.1$"

@@ -32,7 +32,7 @@ for _ in "ab":
     [FORKED.format(METHOD), FORKED.format("spawn"), CHILD],
     ids=["a fork", "without a server", "a process of a job"],
 )
-def test_a_job_imports_what_the_plan_has_read(owner, tmp_path):
+def test_a_job_imports_the_code_that_the_plan_has_read(owner, tmp_path):
     """The file in ``src`` has another text all the time; the second job finds compiled code."""
     (tmp_path / "job.py").write_text(f"import {MODULE}")
     path, kept = plan()[MODULE][0], tmp_path / "plan.json"

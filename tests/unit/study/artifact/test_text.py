@@ -40,7 +40,7 @@ def test_every_special_character_is_escaped():
     assert escape("γΩ") == r"\ensuremath{\gamma}\ensuremath{\Omega}"
 
 
-def test_all_that_is_let_through_is_typeset(tmp_path):
+def test_every_accepted_character_is_typeset(tmp_path):
     """One document with every character, compiled without an error by the preamble's packages."""
     assert len(EVERY) > 350
     preamble = whole_source(ROOT / "paper" / "main.tex").split(r"\input{macros")[0]
@@ -53,7 +53,7 @@ def test_all_that_is_let_through_is_typeset(tmp_path):
     assert (tmp_path / "all.pdf").read_bytes().startswith(b"%PDF")
 
 
-def test_figures_draw_all_that_is_let_through():
+def test_figures_draw_every_accepted_character():
     with style.look(), warnings.catch_warnings():
         warnings.simplefilter("error")
         figure = Figure()
@@ -68,7 +68,7 @@ def test_no_text_is_mathematics_in_a_figure(text):
 
 
 @pytest.mark.parametrize(("text", "named"), [("投影", "U+6295"), ("a\x07", "U+0007")])
-def test_what_cannot_be_typeset_is_refused_by_name(text, named):
+def test_a_character_that_cannot_be_typeset_is_refused_by_name(text, named):
     with pytest.raises(ConfigurationError, match="cannot be typeset") as error:
         require_typeset(text, "methods.yaml: pod.title")
     assert named in str(error.value)
@@ -78,5 +78,5 @@ def test_what_cannot_be_typeset_is_refused_by_name(text, named):
         escape(text)
 
 
-def test_names_of_a_machine_lose_what_cannot_be_typeset():
+def test_names_of_a_machine_lose_characters_that_cannot_be_typeset():
     assert replaced("Core™ é 3") == "Core? é 3"

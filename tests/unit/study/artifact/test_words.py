@@ -15,7 +15,7 @@ def test_every_scene_and_method_of_the_project_has_short_words():
     ] == []
 
 
-def test_names_that_are_unknown_become_words():
+def test_unknown_names_become_words():
     assert words.scene("my_own_scene") == "my own scene"
     assert words.scene("bar_twist_twin") == "twisted bar (short)"
     assert words.method("mine") == "mine"

@@ -52,7 +52,7 @@ def table(written):
     return alternatives([parts], read_table(times.path), [])
 
 
-def test_rows_of_a_scene(written, table):
+def test_a_scene_has_a_row_for_every_setting_mesh_and_trajectory(written, table):
     made = read_table(written[0].path)
     assert made.columns.tolist() == experiment.COLUMNS
     raw = read_table(written[1].path)
@@ -84,7 +84,7 @@ def test_rows_of_a_scene(written, table):
     pd.testing.assert_series_equal(found.sort_index(), ratio.sort_index(), **same)
 
 
-def test_errors_of_a_scene(table):
+def test_errors_of_a_scene_are_against_the_converged_step(table):
     table = table[(table.motion == "heldout") & (table.training_motions.fillna(1) == 1)]
     case = table.set_index(["method", "substeps", "iterations"]).sort_index()
     assert (case.frames == 8).all()
@@ -112,7 +112,7 @@ def test_a_finer_mesh_has_the_mass_of_the_scene():
 
 
 @pytest.mark.parametrize("name", [n for n, t in declared().items() if DAY in t.columns])
-def test_a_table_has_no_times_of_two_machines(name, tmp_path):
+def test_recorded_rows_of_another_machine_have_no_times(name, tmp_path):
     columns = declared()[name].columns
     times = [c.name for c in columns if c.timed and c.unit in ("ms", "s")]
     assert not {*times} & {*pd.read_csv(ROOT / RECORD.format(name))}
@@ -123,7 +123,7 @@ def test_a_table_has_no_times_of_two_machines(name, tmp_path):
         assert {*made[made.isna()].index} == {*times}
 
 
-def test_steps_that_cost_too_much_are_left_out():
+def test_settings_that_cost_too_much_are_left_out():
     work = {"anderson": 2000, "converged": 100}
     asked = Comparison(work=work, steps=STEPS)
     assert asked.pairs("anderson", 10) == [(1, 200)]

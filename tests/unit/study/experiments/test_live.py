@@ -31,7 +31,7 @@ def scene_with(group: str) -> Scene:
 
 
 @pytest.mark.parametrize("group", WEIGHTS)
-def test_the_engine_runs_a_model_as_pdrom_does(group, tmp_path):
+def test_the_engine_of_the_page_runs_a_model_as_pdrom(group, tmp_path):
     scene = scene_with(group)
     file, model = write_models(scene, tmp_path)
     (made,) = evaluate(RUN, file, frames=FRAMES)
@@ -45,7 +45,7 @@ def test_the_engine_runs_a_model_as_pdrom_does(group, tmp_path):
     assert (tmp_path / "test.js").read_bytes() == write_models(scene, tmp_path)[0].read_bytes()
 
 
-def test_a_large_basis_is_short_but_for_what_is_computed_with(tmp_path, monkeypatch):
+def test_a_large_basis_is_rounded_except_for_the_rows_used_in_computations(tmp_path, monkeypatch):
     monkeypatch.setattr(exported, "DOUBLES", 10)
     monkeypatch.setattr(exported, "PROBES", 4)
     scene = scene_with("strain")
@@ -58,7 +58,7 @@ def test_a_large_basis_is_short_but_for_what_is_computed_with(tmp_path, monkeypa
     assert 0.0 <= apart.max() < 1e-6
 
 
-def test_the_file_says_what_it_is_and_a_handle_takes_its_vertices_where_the_reader_does(tmp_path):
+def test_a_model_file_has_a_header_and_a_handle_offset_is_relative(tmp_path):
     """Offsets are relative to the positions of the vertices when the handle was grasped."""
     file, model = write_models(scene_with("spring"), tmp_path)
     text = file.read_text("utf-8")
@@ -94,7 +94,7 @@ def test_a_file_that_is_too_large_names_the_keys(tmp_path, monkeypatch):
         (GRAVITY, {"anderson_window": 3}, "anderson_window = 3"),
     ],
 )  # fmt: skip
-def test_what_the_engine_does_not_know_is_refused(effect, settings, named):
+def test_effects_that_the_engine_does_not_know_are_refused(effect, settings, named):
     with pytest.raises(SceneError, match=named):
         export_scene(make_scene({"effect": "spring", "weight": 1.0}, effect, **settings))
 

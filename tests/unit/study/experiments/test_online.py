@@ -90,13 +90,13 @@ def test_every_model_has_its_errors_and_its_time_in_a_fresh_process(written):
     assert (quoted.reduction_s > 0.0).all()
 
 
-def test_a_process_that_fails_is_told(written):
+def test_a_failed_process_is_reported(written):
     missing = partial(timing.variants, written[0], [({}, None)], 1)
     with pytest.raises(PdromError, match="'NoneType' object has no attribute"):
         in_processes([missing], ONCE)
 
 
-def test_a_motion_that_blows_up_has_an_infinite_error(written):
+def test_a_diverged_trajectory_has_an_infinite_error(written):
     rows, timed = (read_table(path) for path in (written[1], written[2].path))
     chosen = rows[(rows.method == "ecsw-1e-02")].copy()
     chosen["relative_error"] = [0.1, 0.2, None, 0.3]

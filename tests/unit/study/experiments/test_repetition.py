@@ -50,7 +50,7 @@ def short(sheet) -> ReducedRuns:
     return ReducedRuns("spring", data, Yardstick(scene, reference), END).until_the_end()
 
 
-def test_drawn_frames_are_stored_ones_in_order(sheet):
+def test_random_training_frames_are_stored_frames_in_order(sheet):
     data = sheet[2]
     both = np.concatenate([data.train, data.test])
     frames = np.concatenate([data.frames["train"], data.frames["test"]])
@@ -62,7 +62,7 @@ def test_drawn_frames_are_stored_ones_in_order(sheet):
     assert not np.array_equal(drawn(data, 1), drawn(data, 2))
 
 
-def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
+def test_the_error_covers_the_frames_before_the_end(sheet, short):
     scene, reference, data = sheet
     whole = ReducedRuns("spring", data, Yardstick(scene, reference), END)
     (reduction,) = reductions(whole.basis(BLOCK), BLOCK, [3]).values()
@@ -74,7 +74,7 @@ def test_the_error_is_that_of_the_frames_before_the_end(sheet, short):
     assert row["error"] == pytest.approx(expected, rel=1e-9)
 
 
-def test_bases_of_several_motions_are_run_on_the_held_out_ones(sheet):
+def test_bases_of_several_training_trajectories_are_run_on_the_test_trajectories(sheet):
     scene, reference, data = sheet
     runs = ReducedRuns("spring", data, Yardstick(scene, reference), END)
     rows = list(runs.on_motions(BLOCK, [3]))
@@ -87,7 +87,7 @@ def test_bases_of_several_motions_are_run_on_the_held_out_ones(sheet):
     assert rows[0]["gain"] == reduction.gain != rows[-1]["gain"]
 
 
-def test_a_run_that_ends_early_is_wrong_without_bound(short, monkeypatch):
+def test_a_diverged_run_has_an_infinite_error(short, monkeypatch):
     """The limit is half of the extent of the sheet, so that the run ends after one frame."""
     monkeypatch.setattr("pdrom.reduction.deviations.BLOWUP_EXTENT", 0.5)
     (run,) = short.repeat(BLOCK, [3], "start", Repetitions(repetitions=1))
@@ -98,7 +98,7 @@ def test_a_run_that_ends_early_is_wrong_without_bound(short, monkeypatch):
 LADDER = LadderSection(**read_yaml(ROOT / "config" / "default.yaml")["ladder"])
 
 
-def test_rungs_change_one_ingredient_at_a_time():
+def test_ablation_steps_change_one_ingredient_at_a_time():
     for lower, upper in zip(LADDER.up[:-1], LADDER.up[1:], strict=True):
         a, b = lower.model_dump(exclude={"title"}), upper.model_dump(exclude={"title"})
         changed = {key for key in a if a[key] != b[key]}
@@ -107,7 +107,7 @@ def test_rungs_change_one_ingredient_at_a_time():
 
 
 @pytest.mark.parametrize("p", [1, 2, 3])
-def test_the_square_samples_as_many_entries_for_separate_and_shared_coefficients(p, rng):
+def test_separate_and_shared_coefficients_are_compared_with_equal_numbers_of_entries(p, rng):
     snapshots = rng.standard_normal((12, 20 * p, 3))
     entries = []
     for direction, method, _, _ in LADDER.rungs(p):
@@ -140,7 +140,7 @@ def test_a_flat_mesh_may_keep_its_plane(fall):
     assert every[:, 2].all()
 
 
-def test_the_joint_selection_fails_where_an_axis_carries_nothing(fall, tmp_path):
+def test_the_shared_row_selection_fails_if_an_axis_has_no_signal(fall, tmp_path):
     """Without noise in an axis the system of that axis is singular; with noise it is not."""
     asked = module.NoiseRuns(sizes=(2, 5, 99), repetitions=2)
     methods = {name: METHODS[name] for name in ("deim-joint", "published")}

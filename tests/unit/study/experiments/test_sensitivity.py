@@ -15,7 +15,7 @@ SPRING = {"effect": "spring", "weight": 1e5}
 HORIZONTAL = ({"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}, PINS)
 
 
-def test_perturbation_has_its_size_and_its_seed():
+def test_a_perturbation_has_the_given_size_and_depends_on_the_seed():
     scene = make_scene(SPRING, *HORIZONTAL)
     field = perturbation_field(scene, 1e-6, 3)
     assert np.linalg.norm(field, axis=1) == pytest.approx(1e-6 * scene.mesh.extent, rel=1e-12)
@@ -23,7 +23,7 @@ def test_perturbation_has_its_size_and_its_seed():
     assert not np.array_equal(field, perturbation_field(scene, 1e-6, 4))
 
 
-def test_table_has_every_perturbation_seed_variant_and_frame():
+def test_the_table_has_every_perturbation_seed_variant_and_frame():
     scene = make_scene(SPRING, GRAVITY, PINS, frames=4)
     table = module.sensitivities(scene, trajectory(scene), (1e-10, 1e-6), (1, 2))
     assert list(table.columns) == module.COLUMNS
@@ -45,7 +45,7 @@ def test_table_has_every_perturbation_seed_variant_and_frame():
     assert labelled.relative_difference[labelled.seed == 2].tolist() == own.tolist()
 
 
-def test_floors_are_the_largest_over_the_seeds_and_horizons_survive_a_file(tmp_path):
+def test_sensitivities_are_maxima_over_seeds_and_horizons_are_read_as_written(tmp_path):
     """Labels are found as text and, where all labels in the file are numbers, as numbers."""
     floors = perturbed_runs()
     write_table(floors[floors.perturbation == "1e-10"], tmp_path / "sensitivity.csv")
@@ -66,14 +66,14 @@ def test_floors_are_the_largest_over_the_seeds_and_horizons_survive_a_file(tmp_p
         ([0.0, 0.0, np.inf], 2),
     ],
 )  # fmt: skip
-def test_horizon_is_the_first_frame_above(floor, expected):
+def test_the_horizon_is_the_first_frame_above_the_threshold(floor, expected):
     assert horizon(np.array(floor), 1e-3) == expected
 
 
 SOFT = {"effect": "spring", "weight": 1e3}
 
 
-def test_a_contact_acts_where_it_touches_and_a_start_once():
+def test_a_contact_contributes_only_in_contact_and_an_initial_velocity_once():
     floor = {"effect": "floor", "height": 1.9}
     kick = {"effect": "kick", "speed": 1.0, "seed": 1}
     scene = make_scene(SOFT, GRAVITY, floor, kick, frames=40)
@@ -89,7 +89,7 @@ def test_a_contact_acts_where_it_touches_and_a_start_once():
     assert start.energy.item() == pytest.approx(0.5 * float(scene.masses @ (v**2).sum(axis=1)))
 
 
-def test_every_effect_but_the_only_group_is_left_out_in_turn():
+def test_every_effect_except_the_only_group_is_omitted_in_turn():
     scene = make_scene(SOFT, {"effect": "bending", "weight": 1.0}, GRAVITY, PINS)
     assert module.removable(scene.config) == ["spring", "bending", "gravity", "pins"]
     assert module.removable(make_scene(SOFT, GRAVITY).config) == ["gravity"]

@@ -122,7 +122,7 @@ def whole(difference: np.ndarray, moved: np.ndarray) -> float:
     return float(np.linalg.norm(difference) / np.linalg.norm(moved))
 
 
-def test_a_run_starts_at_rest_keeps_what_is_held_and_loses_objective(array, mesh):
+def test_a_run_starts_at_rest_fixes_its_pins_and_lowers_the_objective(array, mesh):
     """Nothing damps: velocities are what the positions say."""
     q, v = array(paths.TRAIN, "positions"), array(paths.TRAIN, "velocities")
     assert np.array_equal(q[0], mesh.points)
@@ -133,7 +133,7 @@ def test_a_run_starts_at_rest_keeps_what_is_held_and_loses_objective(array, mesh
     assert np.all(np.diff(objective, axis=1) <= 1e-9 * np.abs(objective[:, :-1]))
 
 
-def test_errors_of_projections_are_tails_of_the_singular_values(at, array, table):
+def test_projection_errors_are_tails_of_the_singular_values(at, array, table):
     """The sampled reconstruction is worse than the best one, by its gain at most."""
     train = array(paths.SNAPSHOTS, "train")
     sigma = array(paths.BASIS, "singular_values")
@@ -150,7 +150,7 @@ def test_errors_of_projections_are_tails_of_the_singular_values(at, array, table
 
 
 @pytest.mark.parametrize("run", ["train", "heldout"])
-def test_a_rerun_differs_from_the_full_order_by_what_its_table_says(array, table, run):
+def test_the_table_of_reruns_has_the_differences_from_the_full_order_run(array, table, run):
     reference = array(paths.FULL_ORDER.where(run=run), "positions")
     moved = norms(reference[1:] - reference[0])
     heldout = table(paths.RERUNS_HELDOUT).query("motion == @run")
@@ -218,7 +218,7 @@ def shape_norms(runs: np.ndarray, reference: np.ndarray) -> list[float]:
     return [Rotation.align_vectors(*frames)[1] for frames in zip(b, a, strict=True)]
 
 
-def test_test_trajectories_are_what_numpy_finds_in_the_stored_runs(array, at, mesh):
+def test_errors_on_test_trajectories_are_those_that_numpy_finds_in_the_stored_runs(array, at, mesh):
     made = declared()["test_trajectories"](read_table(at(paths.REFERENCES)))
     assert made.motion.tolist() == list(MOTIONS)
     training = array(paths.CONVERGED.where(run="train"), "positions")[1:]
@@ -237,7 +237,7 @@ def test_test_trajectories_are_what_numpy_finds_in_the_stored_runs(array, at, me
             assert found == pytest.approx(errors)
 
 
-def test_the_error_of_a_reference_is_that_of_its_tolerance(again, table):
+def test_the_error_of_a_reference_is_set_by_its_tolerance(again, table):
     """Its second solve is a hundred times finer and starts from the frame's beginning."""
     with patch("study.experiments.references.ConvergedStepper", wraps=ConvergedStepper) as solves:
         coarse = again(references, asked=Reference(tolerance=1e-3))["out"]
@@ -248,7 +248,7 @@ def test_the_error_of_a_reference_is_that_of_its_tolerance(again, table):
     assert (fine[own] < 1e-3).all(axis=None)
 
 
-def test_the_sweep_ends_at_the_horizon_and_with_runs_that_did_not_converge(again, table, tmp_path):
+def test_the_sweep_ends_at_the_horizon_or_an_unconverged_reference(again, table, tmp_path):
     """Nothing is compared with such a run."""
     floor = table(paths.SENSITIVITY)
     early = File(str(tmp_path / "floor.csv"), {"scene": SCENE})
@@ -262,7 +262,7 @@ def test_the_sweep_ends_at_the_horizon_and_with_runs_that_did_not_converge(again
     assert again(iterations, converged=none)["out"].error_converged.isna().all()
 
 
-def test_every_setting_holds_every_model_once(again, monkeypatch):
+def test_every_time_step_and_stiffness_has_every_model_once(again, monkeypatch):
     """(h, ratio): own, other h, other ratio; full order, two methods at two sizes, two models."""
     monkeypatch.setattr("study.experiments.stability.FEWEST", 4)
     monkeypatch.setattr("study.experiments.stability.MOST", 6)
@@ -286,7 +286,7 @@ def test_every_setting_holds_every_model_once(again, monkeypatch):
 
 
 @pytest.mark.parametrize("split", ["train", *MOTIONS])
-def test_runs_in_subspaces_are_their_coordinates(array, table, split):
+def test_positions_of_subspace_runs_are_columns_times_coordinates(array, table, split):
     reference = array(paths.FULL_ORDER.where(run=split), "positions")
     moved = norms(reference[1:] - reference[0])
     heldout = table(paths.SUBSPACES_HELDOUT).query("motion == @split")
@@ -304,7 +304,7 @@ def test_runs_in_subspaces_are_their_coordinates(array, table, split):
     assert (sampled < full.r).all()
 
 
-def test_a_moved_start_changes_nothing_and_other_training_does(table):
+def test_a_perturbed_start_keeps_the_error_and_other_training_frames_change_it(table):
     rows = table(paths.REPETITIONS)
     start, training = (rows[rows.varied == varied] for varied in ("start", "training"))
     assert start.groupby("r").gain.nunique().eq(1).all()
@@ -315,7 +315,7 @@ def test_a_moved_start_changes_nothing_and_other_training_does(table):
     assert training[training.r == 2].error.min() > 1.1 * own
 
 
-def test_every_rung_of_a_ladder_is_run_and_judged(study, again, array):
+def test_every_ablation_step_is_run_and_has_its_errors(study, again, array):
     """Whole elements with shared coefficients are worse than the best by their gain at most."""
     few = {"r": 2, "signs": 2, "repetitions": 3, "sizes": (2, 50), "repeated": (SCENE,)}
     asked = LadderSection(**read_yaml(CONFIG / "default.yaml")["ladder"]).model_copy(update=few)
@@ -337,7 +337,7 @@ def test_every_rung_of_a_ladder_is_run_and_judged(study, again, array):
     assert rows.repetitions.notna().sum() == len(repeated)
 
 
-def test_everything_is_timed_once_and_phases_fit_into_their_frame(table):
+def test_every_run_is_timed_once_and_phases_fit_into_their_frame(table):
     rows = table(paths.TIMINGS)
     key = ["group", "method", "position_basis", "k", "r", "iterations", "implementation"]
     assert not rows.duplicated(key).any()

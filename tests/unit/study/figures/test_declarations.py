@@ -26,7 +26,7 @@ def test_figures_name_scenes_methods_and_groups_that_exist():
 
 
 @pytest.mark.parametrize("name", ["strain_runs", "teaser", "local_share", "ladder", "spring_runs"])
-def test_a_study_without_the_scenes_of_a_figure_draws_its_own_that_fit(small_study, name):
+def test_a_study_without_the_scenes_of_a_figure_draws_similar_scenes(small_study, name):
     study = small_study(["strain_twist"], ["pod"])
     drawn = study.job(name, scenes=("strain_oop",)).settings["drawn"]
     fitting = [] if name == "spring_runs" else ["strain_twist"]
@@ -44,7 +44,7 @@ def test_planning_loads_no_plotting_library():
     assert subprocess.run([sys.executable, "-c", code], env=environment).returncode == 0
 
 
-def test_colours_and_markers_are_unique():
+def test_every_method_has_a_unique_colour_and_marker():
     for looks in (METHODS.values(), style.GROUP_LOOKS):
         assert [len({*column}) for column in zip(*looks, strict=True)] == [len(looks)] * 2
     named = method_styles(["pod", "mine", "yours"])

@@ -75,7 +75,7 @@ def test_every_figure_is_written_without_warnings_and_its_panels_hold_data(
     assert sorted(path.name for path in tmp_path.iterdir()) == [*checksums, "a.pdf", "a.png"]
 
 
-def test_a_missing_file_is_named(study, figure_name, tmp_path):
+def test_a_missing_input_of_a_figure_is_named(study, figure_name, tmp_path):
     with pytest.raises(StorageError, match=str(tmp_path)):
         declarations()[figure_name].draw(**study.read(figure_name, tmp_path))
 
@@ -94,7 +94,7 @@ def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
     assert not any("blew up" in text for text in texts(early))
 
 
-def test_a_run_that_ended_early_lies_on_the_rim(study):
+def test_a_diverged_run_lies_on_the_upper_edge_of_the_axes(study):
     """Error against the constant: as high as the axis goes, and counted among the runs."""
     names = "scene group method r position_basis motion max_extent blowup_frame relative_error"
     runs = [
@@ -118,7 +118,7 @@ def test_a_run_that_ended_early_lies_on_the_rim(study):
     assert [tick.get_text() for tick in right.get_xticklabels()] == ["$10^{1}$ to $10^{2}$"]
 
 
-def test_starts_that_fail_are_counted_below_runs_on_bases_of_round_off(study):
+def test_failed_starts_are_counted_below_runs_with_bases_of_rounding_errors(study):
     """Kinds of starts with equal counts share a row; sizes beyond the rank are left out."""
     runs = [
         ("bend_fall", "bending", axes, "deim-joint", r, 9, None if axes == "plane" else 1e-12)
@@ -147,7 +147,7 @@ def test_a_run_out_of_view_is_drawn_to_a_stated_scale(small_study):
     assert sum("scale 1 :" in text for text in texts(figure)) == 1
 
 
-def test_round_off_is_drawn_and_missing_scenes_and_methods_leave_their_panels_out(
+def test_rounding_errors_are_drawn_and_panels_of_missing_scenes_or_methods_omitted(
     round_off_only, strain_only, figure_name
 ):
     with warnings.catch_warnings():
@@ -178,7 +178,7 @@ def test_figures_are_upright_and_have_the_obstacles_that_the_scene_lists(study):
     ("k", "ran", "shown"),
     [(20, FRAMES, "error 25 %, 0.5 ms"), (9, FRAMES, "k = 9"), (20, 2, "blew up")],
 )
-def test_the_first_figure_shows_a_test_trajectory_and_a_subspace_as_far_as_it_ran(
+def test_the_first_figure_shows_a_test_trajectory_and_a_subspace_run_until_it_ended(
     small_study, monkeypatch, k, ran, shown
 ):
     """The reduced projections are cut off at the frame of the reference, not drawn smaller."""
@@ -207,7 +207,7 @@ def test_the_first_figure_shows_a_test_trajectory_and_a_subspace_as_far_as_it_ra
     assert not any("scale 1 :" in text for text in found)
 
 
-def test_singular_values_below_round_off_are_hollow(study):
+def test_singular_values_below_rounding_errors_have_hollow_marks(study):
     scenes, table = ("bend_fall", "spring_stretch"), reference("singular_values")
     figure = study.draw("singular_values", scenes=scenes)
     for ax, scene in zip(figure.axes, scenes, strict=True):
@@ -217,7 +217,7 @@ def test_singular_values_below_round_off_are_hollow(study):
         assert sum(len(line.get_xdata()) for line in lines) == hollow
 
 
-def test_errors_above_the_axis_are_marked_on_its_rim(study):
+def test_errors_above_the_axis_are_marked_on_its_edge(study):
     errors = [("strain_twist", "strain", "deim", r, "train", 1e5 / 10.0**r) for r in (1, 2, 4)]
     table = frame("scene group method r split relative_error", *errors)
     figure = study.draw("reconstruction_error", {"table": table}, scenes=("strain_twist",))
@@ -256,7 +256,7 @@ def test_error_against_time_has_a_labelled_curve_for_each_kind_of_model(study):
     assert [y for _, y in mesh] == [0.02, 0.02]
 
 
-def test_labels_stand_beside_a_point_of_their_curve():
+def test_labels_stand_next_to_a_point_of_their_curve():
     ax = Figure().subplots()
     ax.set(xlim=(0, 1), ylim=(0, 1))
     up, down = np.array([[0.1, 0.1], [0.8, 0.8]]), np.array([[0.1, 0.9], [0.8, 0.2]])
@@ -293,7 +293,7 @@ def test_the_error_budget_has_medians_of_test_trajectories(study):
     assert found == pytest.approx({"None": 1e-3, "|": 1e-3, "o": 0.2, "x": 0.4})
 
 
-def test_coarser_meshes_have_a_curve_and_the_own_mesh_an_error():
+def test_coarser_meshes_have_a_curve_and_the_mesh_of_the_scene_an_error():
     """Validation trajectories are not drawn."""
     names = "method vertices mesh_error motion error_implicit time_ratio"
     own = [("converged", 400, 0.05, "heldout", 0, None), ("anderson", 400, None, "heldout", 0.2, 1)]
@@ -307,7 +307,7 @@ def test_coarser_meshes_have_a_curve_and_the_own_mesh_an_error():
     assert curves[view.MESH_ERROR["color"]] == [[0.0, 0.05], [1.0, 0.05]]
 
 
-def test_a_speedup_that_is_doubtful_has_another_mark(study):
+def test_a_doubtful_speedup_has_another_mark(study):
     """Hollow: a large error; an arrow: a lower bound; a cross: not judged; errors of large meshes.
 
     Of the reduced models the one with five iterations and most training trajectories is drawn.

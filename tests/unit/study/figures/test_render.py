@@ -47,7 +47,7 @@ def test_boundary_triangles_take_the_value_of_their_tetrahedron():
         assert set(triangle) < set(mesh.tetrahedra[tetrahedron])
 
 
-def test_vertex_values_reach_the_faces_around():
+def test_vertex_values_colour_the_adjacent_faces():
     mesh = cloth(4, 4)
     elements = element_map("bending", mesh, 4, "file")
     values = elements.face_values(np.array([1.0, 1.0, 1.0, 1.0]))
@@ -65,7 +65,7 @@ def test_the_signed_entry_is_the_largest():
     assert signed_entry(vector.ravel(), 1)[1] == "y"
 
 
-def test_residuals_are_those_of_deim():
+def test_drawn_residuals_are_those_of_deim():
     V = np.linalg.qr(np.random.default_rng(3).standard_normal((60, 6)))[0]
     entries = deim_entries(V)
     for step in iterations(V, entries, 2, 6):
@@ -85,7 +85,7 @@ def test_entries_outside_the_basis_are_refused():
         iterations(np.eye(12)[:, :2], np.array([3, 12]), 2, 2)
 
 
-def test_instants_may_be_shares_of_the_first_frames(study):
+def test_drawn_instants_may_be_shares_of_the_first_frames(study):
     path = study.path(TRAIN, "spring_twist")
     frames, positions = positions_at(path, (0.5, 1.0), end=10)
     assert frames == [5, 10]
@@ -95,7 +95,7 @@ def test_instants_may_be_shares_of_the_first_frames(study):
     assert positions_at(path, (1.0,), end=99)[0] == [20]
 
 
-def test_runs_are_read_only_where_finite(study):
+def test_runs_are_read_only_up_to_their_last_finite_frame(study):
     scene, method, r = BLOWN_UP
     path = study.path(RERUNS, scene, "spring", method)
     infos = {info.r: info for info in rerun_infos(path)}

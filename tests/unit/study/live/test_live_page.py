@@ -36,7 +36,7 @@ def write_sheet(folder: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_of_scenes_chosen_in_haste_the_last_is_shown_and_a_lost_one_is_named(tmp_path):
+def test_of_scenes_selected_quickly_the_last_is_shown_and_a_missing_one_is_named(tmp_path):
     """Files may come in any order; the page goes on after one that is missing."""
     one = write_sheet(tmp_path)
     files = [one.with_name(f"{name}.js") for name in "abcd"]
@@ -91,7 +91,7 @@ LIFTED = """
 
 @pytest.mark.slow
 @pytest.mark.parametrize("drawn", ["", "#plain"], ids=["WebGL2", "canvas"])
-def test_a_model_runs_is_drawn_and_is_moved(drawn, tmp_path):
+def test_a_model_runs_is_drawn_and_follows_its_handle(drawn, tmp_path):
     path = write_page(tmp_path, [write_sheet(tmp_path)])
     with page_at(path.as_uri() + drawn, width=900, height=800) as page:
         page.wait_for_selector('body[data-ready="yes"]')

@@ -20,12 +20,12 @@ Next. \known{{Both: {BAR}, {CLOTH}.}}
 
 
 @pytest.mark.parametrize("source", [r"\known{open {x}", r"\known{a \known{b} c}"])
-def test_faulty_blocks_are_named(source):
+def test_a_faulty_optional_block_is_named(source):
     with pytest.raises(PaperError, match=r"contains another|not closed"):
         tex.sentences(source)
 
 
-def test_a_block_needs_all_of_its_numbers_and_its_figure():
+def test_an_optional_block_is_shown_only_with_all_of_its_numbers_and_its_figure():
     made = tex.decisions(BLOCKS, KNOWN, HELD)
     assert made == ["shown", "dropped", "dropped", "dropped"]
     picture = r"\known{\pictureof{bars}{Bars.}}"

@@ -59,7 +59,7 @@ def typed_numbers(source: str) -> list[str]:
 
 
 @pytest.mark.parametrize("document", OWN)
-def test_no_float_waits_where_a_long_table_of_an_own_study_begins(document):
+def test_no_float_is_pending_where_a_long_table_of_another_study_begins(document):
     """Such a table runs over the end of a page that also takes up a float."""
     pattern = r"(\\(picture|figure)of|\\begin\{(table|figure)\})(?s:.)*\\longtableof"
     text = OWN[document].rpartition(r"\begin{document}")[2]
@@ -67,11 +67,11 @@ def test_no_float_waits_where_a_long_table_of_an_own_study_begins(document):
 
 
 @pytest.mark.parametrize("document", SOURCES)
-def test_no_result_is_typed(document):
+def test_no_result_is_typed_in_the_manuscript(document):
     assert typed_numbers(SOURCES[document]) == typed_numbers(OWN[document]) == []
 
 
-def test_the_text_of_other_scenes_speaks_of_what_it_shows_and_of_no_claim():
+def test_the_text_of_a_study_of_other_scenes_mentions_its_figures_and_no_claim():
     source = "".join(text.partition(r"\title")[2] for text in OWN.values())
     assert re.findall(r"verdict|claim|preprint|replication|ifpart", source) == []
     figures = set(re.findall(r"(?:figureof|pictureof)\{(\w+)", source))
@@ -84,7 +84,7 @@ def test_the_text_of_other_scenes_speaks_of_what_it_shows_and_of_no_claim():
             assert NUMBERS[name].table in ("study", "scenes", "methods", "machine")
 
 
-def test_a_study_of_other_scenes_has_its_own_text():
+def test_a_study_of_other_scenes_has_another_text():
     settings = read_yaml(ROOT / "config" / "default.yaml")
     changes = {"scenes": ["ball_shell"], "noise": {"cases": {}}}
     study = Study({**settings, **changes}, ROOT, configuration="config/mine.yaml")
@@ -107,7 +107,7 @@ def test_a_typed_result_is_found(sentence):
     assert len(typed_numbers(changed)) == 1
 
 
-def test_only_packages_of_both_tex_systems():
+def test_the_preamble_loads_only_packages_of_both_tex_systems():
     allowed = {
         "fontenc", "inputenc", "lmodern", "amsmath", "geometry", "graphicx", "xcolor", "array",
         "longtable", "enumitem", "microtype", "hyperref", "xr-hyper", "tabularx", "rotating", "url",
@@ -126,7 +126,7 @@ def test_every_number_is_a_column_of_a_table_and_is_cited():
     assert set(names_of(SOURCE + "".join(OWN.values()))) == set(NUMBERS)
 
 
-def test_every_figure_of_the_study_is_shown_or_named_and_the_text_speaks_of_what_it_shows():
+def test_every_figure_is_shown_or_named_and_the_text_mentions_each_shown_figure():
     shown = re.findall(r"\\figureof\{([a-z_]+)\}", SOURCE)
     assert len(set(shown)) == len(shown)
     named = {name.replace("\\_", "_") for name in re.findall(r"\\texttt\{([a-z_\\]+)\}", SOURCE)}
@@ -134,14 +134,14 @@ def test_every_figure_of_the_study_is_shown_or_named_and_the_text_speaks_of_what
     assert set(shown) <= set(re.findall(r"\\ref\{fig:([a-z_]+)\}", SOURCE))
 
 
-def test_every_table_is_included_and_the_text_speaks_of_it():
+def test_every_table_is_included_and_mentioned_in_the_text():
     assert sorted(re.findall(r"tab_\w+", SOURCE)) == sorted(TEX_TABLES)
     labels = re.findall(r"\\label\{(tab:[a-z]+)\}|\\longtableof\{.*?\}\{(tab:[a-z]+)\}", SOURCE)
     shown = {one or other for one, other in labels}
     assert shown == set(re.findall(r"\\ref\{(tab:[a-z]+)\}", SOURCE)) != set()
 
 
-def test_numbers_that_a_configuration_may_lack_stand_in_sentences_that_can_be_left_out():
+def test_numbers_that_a_configuration_may_lack_stand_in_optional_blocks():
     """Outside of them only what every configuration holds."""
     blocks = [sentence.text for sentence in sentences(SOURCE)]
     outside = SOURCE
@@ -192,7 +192,7 @@ BIB = """
 """
 
 
-def test_cited_entries_only_in_order(tmp_path):
+def test_only_cited_entries_are_printed_in_order(tmp_path):
     references = tmp_path / "references.bib"
     references.write_text(BIB)
     text = bibliography(r"\cite{beta} \cite{alpha,beta}", references)
@@ -216,7 +216,7 @@ def test_cited_entries_only_in_order(tmp_path):
          "missing publisher in alpha"),
     ],
 )  # fmt: skip
-def test_faults_are_named_with_the_file(tmp_path, content, source, message):
+def test_faults_of_the_manuscript_are_named_with_the_file(tmp_path, content, source, message):
     path = tmp_path / "references.bib"
     path.write_text(content)
     with pytest.raises(PaperError, match=rf"references\.bib.*{message}"):
@@ -237,7 +237,7 @@ def test_figures_are_numbered_as_the_source_places_them(tmp_path):
         figure_numbers(tmp_path)
 
 
-def test_nothing_but_figureof_makes_a_figure_and_every_configuration_has_all():
+def test_every_figure_is_made_by_figureof_outside_optional_blocks():
     for text in SOURCES.values():
         assert len(re.findall(r"\\begin\{figure", text)) == 1, "the definition of \\figureof"
         assert [s.text for s in sentences(text) if "figureof" in s.text] == []

@@ -57,7 +57,7 @@ def number(asked: Entry) -> tex.Number:
         (entry("ranks", table="study"), "6, 10"),
     ],
 )
-def test_numbers_by_hand(asked, expected):
+def test_a_number_of_the_manuscript_is_the_value_by_hand(asked, expected):
     assert number(asked).text == expected
 
 
@@ -70,12 +70,12 @@ def test_numbers_by_hand(asked, expected):
         (entry("error", scene="b"), "own.* 2 rows of 'runs' match; add"),
     ],
 )
-def test_a_faulty_entry_is_named(asked, message):
+def test_a_faulty_entry_of_a_number_is_named(asked, message):
     with pytest.raises(PaperError, match=message):
         number(asked)
 
 
-def test_an_unknown_name_is_refused():
+def test_an_unknown_number_is_refused():
     with pytest.raises(PaperError, match=r"\\n\{bars\}: no entry.*'bar'"):
         tex.number_of("bars", {"bar": entry("error")}, TABLES)
 
@@ -100,7 +100,7 @@ def test_numbers_that_the_text_does_not_expect_are_listed(expect, met):
     assert tex.unexpected(missing, TABLES) == {}
 
 
-def test_names_in_order_of_first_use():
+def test_names_of_numbers_are_in_order_of_first_use():
     assert tex.names_of(r"a \n{b} \nu{x} \n{a} \norm{y} \n{b} \n {z}") == ["b", "a"]
 
 
@@ -115,12 +115,12 @@ def test_names_in_order_of_first_use():
         (float("-inf"), r"\ensuremath{-\infty}"), (True, "yes"), (False, "no"), ("a_b", r"a\_b"),
     ],
 )  # fmt: skip
-def test_numbers_as_text(value, expected):
+def test_a_number_is_formatted_as_tex(value, expected):
     assert tex.format_number(value) == expected
 
 
 @given(st.floats(1e-12, 1e12))
-def test_text_of_a_number_is_close_to_it(value):
+def test_the_printed_number_is_close_to_its_value(value):
     text = shown = tex.format_number(value)
     for old, new in ((r"\ensuremath{", ""), (r"\cdot 10^{", "e"), ("}", "")):
         text = text.replace(old, new)
@@ -142,5 +142,5 @@ HELD = {"runs": frame("scene method outcome error end", ("bar", "pod", "wrong", 
         (entry("error", "count", scene="cloth", outcome="accurate"), False),
     ],
 )
-def test_what_a_configuration_holds(asked, held):
+def test_a_number_needs_the_scenes_and_methods_of_its_entry(asked, held):
     assert tex.is_held("own", {"own": asked}, HELD) is held

@@ -30,7 +30,7 @@ def project(folder, text=DOCUMENT):
     return source
 
 
-def test_output_is_a_pdf_alone_in_its_folder(tmp_path):
+def test_the_output_folder_contains_only_the_pdf(tmp_path):
     output = tmp_path / "out" / "main.pdf"
     build_pdfs({project(tmp_path): output}, [tmp_path / "generated"])
     assert output.read_bytes().startswith(b"%PDF-")
@@ -53,7 +53,7 @@ def test_output_is_a_pdf_alone_in_its_folder(tmp_path):
          r"1 boxes do not fit: Overfull \\vbox"),
     ],
 )  # fmt: skip
-def test_faults_are_one_line_and_leave_the_old_pdf(tmp_path, old, new, message):
+def test_a_fault_gives_one_line_and_leaves_the_old_pdf(tmp_path, old, new, message):
     source = project(tmp_path, DOCUMENT.replace(old, new))
     output = tmp_path / "main.pdf"
     output.write_bytes(b"old")
@@ -95,7 +95,7 @@ def test_documents_refer_to_each_other(tmp_path):
     assert [pdf.read_bytes() for pdf in documents.values()] == before
 
 
-def test_a_document_with_too_many_pages_is_refused_with_the_other(tmp_path):
+def test_a_document_with_too_many_pages_is_refused_and_no_pdf_is_written(tmp_path):
     documents = linked(tmp_path, r"\newpage Next.")
     with pytest.raises(PaperError, match=r"main\.tex: 2 pages, at most 1 are allowed"):
         build_pdfs(documents, [], {"main": 1})
@@ -103,13 +103,13 @@ def test_a_document_with_too_many_pages_is_refused_with_the_other(tmp_path):
     build_pdfs(documents, [], {"main": 2})
 
 
-def test_the_shell_is_out_of_reach(tmp_path):
+def test_tex_cannot_run_shell_commands(tmp_path):
     text = DOCUMENT.replace("Section", rf"\immediate\write18{{touch {tmp_path}/made}}")
     build_pdfs({project(tmp_path, text): tmp_path / "main.pdf"}, [tmp_path / "generated"])
     assert not (tmp_path / "made").exists()
 
 
-def test_without_any_tex_the_reason_is_given(tmp_path, monkeypatch):
+def test_a_machine_without_tex_gets_the_reason(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setattr("study.paper.tex.find_spec", lambda name: None)
     with pytest.raises(PaperError, match="no pdflatex with the needed packages on PATH"):

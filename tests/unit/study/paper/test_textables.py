@@ -203,7 +203,7 @@ bar a, 9 & 4 vertices, $K = 3$, accelerated & 0.10 & 0.12 & 1 & -- & -- \\
 
 
 @pytest.mark.parametrize("name", TEX_TABLES)
-def test_rows_of_a_table(name):
+def test_a_table_of_the_manuscript_has_the_expected_rows(name):
     """The rows of its body, each with as many cells as its head."""
     lines = tex_table(name, TABLES).splitlines()
     head, *lines = [line for line in lines if line.endswith(r" \\")]
@@ -232,7 +232,7 @@ PAGE = r"""\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}\u
 
 @pytest.mark.parametrize("long", [False, True])
 @pytest.mark.parametrize("rows", [[], [["a", "1"]], [["a", "1"], ["b", "2"]]])
-def test_a_table_is_set(long, rows, tmp_path):
+def test_a_table_of_the_manuscript_is_typeset(long, rows, tmp_path):
     """A table without rows is that of a configuration which holds nothing of what it shows."""
     text = tabular(["name", "number"], rows, "lr", long)
     assert text.count(r"name & number \\") == (2 if long else 1)

@@ -46,7 +46,7 @@ def parse(text: str) -> CommandLine:
         ("-j2 -n x", (), (), ("x",)),
     ],
 )
-def test_files_settings_and_targets(arguments, configfiles, settings, targets):
+def test_a_command_line_has_files_settings_and_targets(arguments, configfiles, settings, targets):
     command = parse(arguments)
     assert (command.configfiles, command.settings) == (configfiles, settings)
     assert command.targets == targets
@@ -58,7 +58,7 @@ RUNS = ["", "--touch", "--unlock", "--delete-all-output", "--report a.html --rep
 
 
 @pytest.mark.parametrize("arguments", [*LOOKS_ONLY, *RUNS])
-def test_what_runs_no_job(arguments):
+def test_commands_that_run_no_job_are_recognised(arguments):
     assert parse(arguments).looks_only == (arguments in LOOKS_ONLY)
 
 
@@ -109,7 +109,7 @@ def test_targets_are_replaced_and_options_kept(given, more, made, expected):
         (("a b.yaml",), ("study=ab",), "ab"),
     ],
 )
-def test_the_folder_of_a_configuration(files, settings, name):
+def test_a_configuration_has_its_folder_of_results(files, settings, name):
     results = f"results/studies/{name}"
     expected = Folders(results, f"{results}/paper/main.pdf") if name else Folders()
     assert folders(files, settings) == expected
@@ -131,7 +131,7 @@ def test_options_are_added_and_cores_unless_given():
     assert completed(["--cores", "1"]) == ["--cores", "1", *LINES, *OPTIONS]
 
 
-def test_names_become_files_and_it_is_said(capsys):
+def test_names_become_files_which_are_printed(capsys):
     made = ["results/figures/scaling.pdf", "results/tables/scaling.csv"]
     assert completed(["-n", "--", "scaling", "x"])[-4:] == ["--", *made, "x"]
     assert capsys.readouterr().err == f"reproduce: scaling: {', '.join(made)}\n"
@@ -166,7 +166,7 @@ def test_a_figure_may_stand_before_and_behind_options(asked):
         ("--configfile config", ["config: a folder"]),
     ],
 )
-def test_what_does_not_exist_is_named_with_what_there_is(asked, parts):
+def test_a_missing_figure_or_file_is_named_with_the_existing_ones(asked, parts):
     with pytest.raises(ConfigurationError) as caught:
         completed(asked.split())
     assert [part for part in parts if part not in str(caught.value)] == [], str(caught.value)

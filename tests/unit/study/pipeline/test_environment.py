@@ -26,7 +26,7 @@ INHERITED = {
 }  # fmt: skip
 
 
-def test_nothing_inherited_changes_a_result():
+def test_no_inherited_variable_changes_a_result():
     names = ("PATH", "HOME", "NUMBA_CACHE_DIR", "SLURM_JOB_ID")
     bare = {name: INHERITED[name] for name in names}
     for kernels, target in (("Haswell", compiled_for("x86_64", set(COMPILED_HASWELL))), (None, {})):
@@ -38,7 +38,7 @@ def test_nothing_inherited_changes_a_result():
         assert made.get("OPENBLAS_CORETYPE") == kernels
 
 
-def test_what_is_asked_for_is_kept_as_it_is():
+def test_requested_variables_are_kept():
     asked = INHERITED | {"PDROM_KEEP": "OPENBLAS_CORETYPE OMP_NUM_THREADS NUMBA_CPU_NAME"}
     made = settled(asked, "Haswell", compiled_for("x86_64", set(COMPILED_HASWELL)))
     assert made["OPENBLAS_CORETYPE"] == "Prescott"
@@ -70,7 +70,7 @@ CPUINFO = {
         ("Darwin", "arm64", "empty", None),
     ],
 )
-def test_kernels_are_the_newest_that_every_processor_has(system, machine, cpuinfo, expected):
+def test_kernels_are_the_newest_that_all_processors_support(system, machine, cpuinfo, expected):
     assert core_type(system, machine, processor_features(CPUINFO[cpuinfo])) == expected
 
 
@@ -80,7 +80,7 @@ def said(code: str, environment: dict[str, str]) -> list:
     return json.loads(subprocess.run(command, env=environment, stdout=-1, check=True).stdout)
 
 
-def test_the_kernels_are_those_of_numpy_and_of_scipy():
+def test_numpy_and_scipy_use_the_chosen_kernels():
     """Set as a run sets them, both libraries report them."""
     kernels = core_type(platform.system(), platform.machine(), features_here())
     if not kernels:
@@ -95,7 +95,7 @@ def test_the_kernels_are_those_of_numpy_and_of_scipy():
 
 
 @pytest.mark.parametrize("missing", sorted(COMPILED_HASWELL))
-def test_a_processor_that_lacks_an_instruction_is_compiled_for_as_it_is(missing):
+def test_a_processor_without_a_required_instruction_keeps_the_default_target(missing):
     assert (
         compiled_for("x86_64", set(COMPILED_HASWELL) | {"avx512f"})["NUMBA_CPU_NAME"] == "haswell"
     )
@@ -104,7 +104,7 @@ def test_a_processor_that_lacks_an_instruction_is_compiled_for_as_it_is(missing)
     assert compiled_for("aarch64", set()) == compiled_for("arm64", {"asimd"})
 
 
-def test_kernels_are_compiled_for_the_target():
+def test_kernels_are_compiled_for_the_chosen_processor():
     """What numba says it compiled a kernel for, and keys its cache by, is what was chosen."""
     target = compiled_for(platform.machine(), features_here())
     code = (

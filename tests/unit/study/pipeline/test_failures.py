@@ -17,7 +17,7 @@ def fail(failures, rule, log, said="", indent=False):
         failures.emit(logging.makeLogRecord(record))
 
 
-def test_each_failed_job_is_named_with_its_error_or_what_snakemake_says(tmp_path):
+def test_each_failed_job_is_named_with_its_error_or_the_message_of_snakemake(tmp_path):
     failures, log = Failures(), tmp_path / "job.log"
     with pytest.raises(SystemExit), job_log(str(log)):
         raise ValueError("vertex 3 is nan")

@@ -63,7 +63,7 @@ CODE = [
 
 
 @pytest.mark.parametrize("edit", [*WORDS, *CODE])
-def test_code_counts_and_text_about_it_does_not(edit):
+def test_fingerprints_depend_on_code_and_not_on_comments(edit):
     assert edit[0] in SOURCE
     edited = digest_of_source(SOURCE.replace(*edit))
     assert (edited != digest_of_source(SOURCE)) == (edit in CODE)
@@ -85,14 +85,14 @@ THINGS = Registry("thing", {"own": "pdrom.here:Own", "other": "pdrom.there:Other
         ("Registry(", "dict(", True),
     ],
 )
-def test_entries_of_a_registry_for_other_modules_do_not_count(old, new, counts):
+def test_fingerprints_ignore_registry_entries_of_other_modules(old, new, counts):
     """Who asks for one lists it; entries for the module itself are its code."""
     assert old in REGISTRY
     edited = digest_of_source(REGISTRY.replace(old, new), "pdrom.here")
     assert (edited != digest_of_source(REGISTRY, "pdrom.here")) == counts
 
 
-def test_an_entry_counts_by_its_attribute_too():
+def test_fingerprints_depend_on_the_attribute_of_a_registry_entry():
     """Two effects of one module."""
     pins, rotate = (fingerprint(EFFECTS[name]) for name in ("pins", "rotate"))
     assert EFFECTS["pins"].partition(":")[0] == EFFECTS["rotate"].partition(":")[0]
@@ -100,7 +100,7 @@ def test_an_entry_counts_by_its_attribute_too():
     assert closure(EFFECTS["pins"]) == closure(EFFECTS["pins"].partition(":")[0])
 
 
-def test_selections_are_in_no_closure_that_does_not_list_them():
+def test_a_method_depends_only_on_the_selection_that_it_names():
     own = {entry.partition(":")[0] for entry in SELECTIONS.values()}
     for name in SELECTIONS:
         method = MethodSpec(title="test", rows="element", selection=name)
@@ -110,7 +110,7 @@ def test_selections_are_in_no_closure_that_does_not_list_them():
     assert not own & set(closure("pdrom.reduction.sampling.reduction", *everything.modules))
 
 
-def test_unknown_modules_are_named():
+def test_an_unknown_module_is_named():
     with pytest.raises(ConfigurationError, match=r"pdrom\.nothing"):
         fingerprint("pdrom.nothing")
 
@@ -133,7 +133,7 @@ def command(path, *names: str) -> list[object]:
     return found
 
 
-def test_data_are_kept_for_the_next_command_by_all_that_they_depend_on(tmp_path):
+def test_stored_data_are_found_by_all_their_dependencies(tmp_path):
     path = tmp_path / "new" / "plan.json"
     first = Memory(path)
     assert first.get(lambda: [1], "a", "same") == first.get(lambda: [2], "a", "same") == [1]
@@ -145,12 +145,12 @@ def test_data_are_kept_for_the_next_command_by_all_that_they_depend_on(tmp_path)
 
 
 @pytest.mark.parametrize("content", [b"", b"[1]"])
-def test_a_damaged_file_and_one_that_cannot_be_written_count_as_none(tmp_path, content):
+def test_a_damaged_or_unwritable_memory_is_ignored(tmp_path, content):
     (tmp_path / "plan.json").write_bytes(content)
     assert command(tmp_path / "plan.json" / "below", "a") == command(tmp_path / "plan.json", "a")
 
 
-def test_a_changed_scene_is_built_again_and_its_warning_repeated(tmp_path, monkeypatch, caplog):
+def test_a_changed_scene_is_built_again_and_the_warning_is_repeated(tmp_path, monkeypatch, caplog):
     project = make_project(tmp_path, {SCENE: with_mesh(f"{{kind: file, path: {MESH}}}")})
     build, built = scenes.load_bound_scene, []
     monkeypatch.setattr(scenes, "load_bound_scene", lambda *a: built.append(a) or build(*a))

@@ -53,7 +53,7 @@ def script(folder: Path, text: str, name: str = "a script é.py") -> str:
     return str(path)
 
 
-def test_a_job_has_the_surroundings_of_the_run_and_does_not_see_another_job(tmp_path):
+def test_a_job_has_the_environment_of_the_run_and_nothing_of_another_job(tmp_path):
     code = """
 import os, sys
 print(os.getcwd(), os.environ["COLOUR"], sys.argv, sys.path[0], sys.stdin.read())
@@ -68,7 +68,7 @@ print("a warning", file=sys.stderr)
     assert done.stderr == "a warning\n" * 2
 
 
-def test_a_fork_has_what_numba_registers(tmp_path):
+def test_a_forked_job_has_the_registered_types_of_numba(tmp_path):
     """What else each process that loads a compiled function would import anew."""
     code = """
 import sys
@@ -82,7 +82,7 @@ print(sorted(set(sys.modules) - known))
     assert done.stdout.splitlines() == ["[]", "ended 0"]
 
 
-def test_the_run_learns_how_a_job_ends(tmp_path):
+def test_a_run_gets_the_exit_status_of_a_job(tmp_path):
     codes = [
         "import sys; sys.exit(3)",
         "import sys; sys.exit('pdrom: no')",
@@ -146,7 +146,7 @@ def test_a_job_ends_with_its_server_and_the_next_one_has_another_server(tmp_path
     assert owner.communicate() == ("ended 255\nnext\nended 0\n", None)
 
 
-def test_a_script_in_a_container_is_left_to_snakemake(monkeypatch):
+def test_snakemake_starts_scripts_in_containers(monkeypatch):
     ran = []
     monkeypatch.setattr(fork_server, "METHOD", "spawn")
     monkeypatch.setattr(PythonScript, "execute_script", lambda *given: ran.append(given))
@@ -165,7 +165,7 @@ def test_a_script_in_a_container_is_left_to_snakemake(monkeypatch):
     ],
     ids=["here", "hands the batch on", "runs the batch"],
 )
-def test_a_batch_on_a_node_has_a_server(monkeypatch, remote, arguments, starts):
+def test_a_batch_on_a_cluster_node_has_a_fork_server(monkeypatch, remote, arguments, starts):
     started = []
     monkeypatch.setattr(running, "start_server", lambda: started.append(1))
     monkeypatch.setattr(sys, "argv", ["snakemake", *arguments])

@@ -50,7 +50,7 @@ def say(results: Path, log: str, processor: float, wall: float = 0.0, memory: fl
     ("log", "kind"),
     [("fom/sheet.log", "fom"), ("hard_cases.log", "hard_cases"), ("tables/payoff.log", "tables")],
 )
-def test_a_job_takes_what_jobs_of_its_kind_took_on_meshes_like_its_own(log, kind):
+def test_the_expected_time_of_a_job_is_that_of_its_kind_on_similar_meshes(log, kind):
     place = f"results/studies/logs/logs/{log}"
     assert expected_seconds(plan())(place) == TABLE.seconds[kind]
     coarse = expected_seconds(plan(resolution=0.5))
@@ -60,7 +60,7 @@ def test_a_job_takes_what_jobs_of_its_kind_took_on_meshes_like_its_own(log, kind
     assert expected_seconds(plan())(unknown) == TABLE.seconds.median()
 
 
-def test_pages_say_the_times_of_the_record_and_the_unit():
+def test_pages_state_the_recorded_times_with_their_unit():
     pages = ("README.md", "docs/running.md")
     readme, running = ((ROOT / page).read_text("utf-8") for page in pages)
     times = pd.read_csv(ROOT / "config/reference/run_times.csv").set_index("study")
@@ -73,7 +73,7 @@ def test_pages_say_the_times_of_the_record_and_the_unit():
         assert minutes(study.processor_s) in running
 
 
-def test_every_experiment_was_measured_and_takes_time_and_every_claim_is_recorded():
+def test_every_experiment_has_a_recorded_time_and_every_claim_a_recorded_verdict():
     for _, record in pd.read_csv(ROOT / RECORDED).groupby("replication"):
         assert record.claim.tolist() == list(load_claims(ROOT / RULES))
     assert set(experiments()) <= set(TABLE.index)
@@ -98,7 +98,7 @@ def test_costs_are_read_from_the_logs_of_two_runs(tmp_path):
 
 @pytest.mark.parametrize("kind", TABLE.index)
 @pytest.mark.parametrize("attempt", [1, 2])
-def test_the_profile_asks_for_more_than_any_measured_job_needed(kind, attempt):
+def test_the_cluster_profile_requests_more_than_any_recorded_job_needed(kind, attempt):
     """What the workflow calls by another name than the kind has the default request."""
     asked = PROFILE["default-resources"] | PROFILE["set-resources"].get(kind, {})
     memory, minutes = (eval(asked[key], {"attempt": attempt}) for key in ("mem_mb", "runtime"))
@@ -143,7 +143,7 @@ def record(tmp_path: Path) -> Path:
     return folder
 
 
-def test_another_verdict_is_not_the_same_and_none_is_not_counted(record: Path) -> None:
+def test_a_changed_verdict_is_different_and_a_missing_one_undecidable(record: Path) -> None:
     recorded = pd.read_csv(record / "claims.csv")
     assert re.fullmatch(r"20\d\d-\d\d-\d\d", recorded.date[0])
     recorded.assign(rules=["00000000", recorded.rules[1]]).to_csv(record / "claims.csv")
@@ -159,7 +159,7 @@ def test_another_verdict_is_not_the_same_and_none_is_not_counted(record: Path) -
 @pytest.mark.parametrize(
     "change", [("fingerprint", lambda *_: "changed"), ("OTHERS", "config/tiny.yaml")]
 )
-def test_a_record_is_refused_if_code_or_a_scene_changed_since_it_was_frozen(
+def test_a_record_is_refused_if_code_or_a_scene_changed_after_it_was_frozen(
     record, tmp_path, monkeypatch, change
 ):
     monkeypatch.chdir(tmp_path)

@@ -41,7 +41,7 @@ def test_every_table_finds_what_it_reads_in_the_order_of_the_study():
     assert made["claims"].inputs["rules"] == "config/claims.yaml"
 
 
-def test_an_own_study_plans_only_what_its_own_scenes_have():
+def test_a_study_of_other_scenes_plans_only_files_of_its_scenes():
     default = read_yaml(CONFIG_FOLDER / "default.yaml")
     own = Plan(Study(default | {"scenes": ["ball_shell", "torus_release"]}, ROOT), Folders("out"))
     own.check()
@@ -67,7 +67,7 @@ def test_an_own_study_plans_only_what_its_own_scenes_have():
         assert {*whole.tables, *whole.figures} == {*declared(), *declarations()}
 
 
-def test_a_setting_is_a_parameter_of_those_who_read_it_only():
+def test_a_setting_is_a_parameter_only_of_jobs_that_read_it():
     before, after = plan(), plan(stability={"wrong": 0.3})
     tables = declared().values()
     changed = {t.name for t in tables if before.job(t).settings != after.job(t).settings}
@@ -81,7 +81,7 @@ def test_a_setting_is_a_parameter_of_those_who_read_it_only():
         (TableOf("sensitivty"), "'sensitivty'.*sensitivity"),
     ],
 )
-def test_what_does_not_exist_is_named(read, message):
+def test_a_missing_scene_or_method_is_named(read, message):
     asked = plan()
     asked.tables = {"payoff": replace(declared()["payoff"], reads={"reruns": read})}
     with pytest.raises(ConfigurationError, match=message):
@@ -114,7 +114,7 @@ def changed(root: Path, old: str, new: str) -> set[str]:
     return {key[0] for key in before if before[key] != after[key]}
 
 
-def test_an_edit_plans_what_reads_or_prints_it(tmp_path):
+def test_an_edit_of_a_scene_plans_the_jobs_that_read_or_print_it(tmp_path):
     """A title the page of models alone, a weight the simulation."""
     root = make_project(tmp_path, {})
     (root / STUDY).write_text((root / STUDY).read_text() + LIVE)

@@ -30,7 +30,7 @@ JOB = {"event": LogEvent.JOB_INFO, "rule_name": "fom", "rule_msg": None, "create
 DONE = {"event": LogEvent.JOB_FINISHED}
 
 
-def test_jobs_have_counts_and_after_a_twentieth_of_the_work_its_share_and_the_time_left(emit):
+def test_jobs_have_counts_and_after_5_percent_of_the_work_the_time_left(emit):
     """A job without a measured time does not count."""
     lines = emit(
         {"event": LogEvent.RUN_INFO, "stats": {"total": 11}},
@@ -47,7 +47,7 @@ def test_jobs_have_counts_and_after_a_twentieth_of_the_work_its_share_and_the_ti
     assert lines[2].endswith(f" fom   10% done, {rounded(540.0)} left")
 
 
-def test_failed_jobs_warnings_and_errors_outside_of_jobs_are_printed(emit):
+def test_failed_jobs_warnings_and_errors_outside_jobs_are_printed(emit):
     failed = {"event": LogEvent.JOB_ERROR, "rule_name": "fom", "rule_msg": None}
     error = {"event": LogEvent.ERROR, "levelno": logging.ERROR}
     lines = emit(

@@ -43,7 +43,7 @@ def snakemake_lock() -> None:
     (running.SNAKEMAKE_LOCKS / "0.output.lock").write_text("results/x\n")
 
 
-def test_the_second_process_names_the_first_whose_locks_go_with_it(other):
+def test_a_second_run_names_the_first_and_locks_end_with_their_process(other):
     snakemake_lock()
     with pytest.raises(PdromError, match=rf"process {other.pid} on .* uses this folder"):
         running.hold()

@@ -32,7 +32,7 @@ def test_short_runs_are_planned_where_the_study_holds_them():
     assert labels_of(study(), paths.STABILITY) == []
 
 
-def test_other_methods_run_on_small_and_on_large_scenes_of_the_study():
+def test_alternatives_run_on_small_and_on_large_scenes_of_the_study():
     scenes = {"bar_release": [1], "strain_oop": [1, 2], "torus_release": [1]}
     made = study(alternatives={"scenes": scenes}, online={"scenes": ["torus_release"]})
     asked = [(run["scene"], run["factor"]) for run in labels_of(made, paths.ALTERNATIVES)]
@@ -40,7 +40,7 @@ def test_other_methods_run_on_small_and_on_large_scenes_of_the_study():
 
 
 @pytest.mark.parametrize("name", ["default", "tiny"])
-def test_the_configurations_hold_what_they_ask_for(name):
+def test_the_configurations_contain_everything_that_they_request(name):
     """Nothing in these two files is left out without a word."""
     config = read_yaml(CONFIG / "default.yaml")
     if name == "tiny":
@@ -64,7 +64,7 @@ def windy(root, **sections) -> Study:
     return Study(base | sections, root)
 
 
-def test_what_no_subspace_takes_has_all_but_what_is_of_a_subspace(root):
+def test_a_scene_that_no_subspace_accepts_has_all_other_results(root):
     held = windy(root)
     without = {
         place
@@ -88,7 +88,7 @@ def test_what_no_subspace_takes_has_all_but_what_is_of_a_subspace(root):
         ("alternatives", {"windy": [1.0]}),
     ],
 )
-def test_where_a_subspace_is_asked_for_the_scene_is_refused(root, key, scenes):
+def test_a_scene_that_no_subspace_accepts_is_refused_if_a_subspace_is_requested(root, key, scenes):
     with pytest.raises(ConfigurationError, match=rf"{key}.scenes: scene 'windy' has the effect"):
         check_subspaces(windy(root, **{key: {"scenes": scenes}}))
 
@@ -100,7 +100,7 @@ def test_where_a_subspace_is_asked_for_the_scene_is_refused(root, key, scenes):
         ({"effects": [{"effect": "bending", "weight": 1.0}], "reduce": {}}, "has no 'bending'"),
     ],
 )
-def test_a_scene_that_the_page_cannot_hold_is_refused_by_the_plan(root, changes, words):
+def test_a_scene_that_the_page_of_models_cannot_show_is_refused_by_the_plan(root, changes, words):
     path = root / "config" / "scenes" / "spring_oop.yaml"
     check_live(windy(root, live={"scenes": ["spring_oop"]}))
     path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | changes))

@@ -46,7 +46,7 @@ def test_a_whole_study_names_its_configuration_verdicts_and_results():
         assert part in said[key]
 
 
-def test_processor_time_counts_what_this_process_waited_for():
+def test_processor_time_includes_finished_child_processes():
     work = "import time\nwhile time.process_time() < 0.3: pass"
     before = processor_seconds()
     subprocess.run([sys.executable, "-c", work], check=True)

@@ -52,7 +52,7 @@ def plan():
     return Plan(Study(config, ROOT))
 
 
-def test_what_a_rule_makes_is_a_target(plan):
+def test_every_file_that_a_rule_makes_is_a_target(plan):
     """Files of the study, and of scenes outside it."""
     scenes = [*plan.study.scenes, "bar_twist"]
     wanted = [f"results/fom/{scene}/heldout.h5" for scene in scenes]
@@ -68,6 +68,6 @@ def test_what_a_rule_makes_is_a_target(plan):
         ("scaling_tabel", "scaling_table"),
     ],
 )
-def test_what_nobody_makes_is_named_with_a_suggestion(target, guess, plan):
+def test_an_unknown_target_is_named_with_a_suggestion(target, guess, plan):
     with pytest.raises(ConfigurationError, match=f"'{target}': .*'{guess}'"):
         check_targets(plan, [target], RULES)

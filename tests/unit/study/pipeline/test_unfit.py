@@ -103,7 +103,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_the_plan_names_the_damaged_file_and_its_reader_sets_it_aside(damage, plan):
+def test_the_plan_names_the_damaged_file_and_its_reader_renames_it(damage, plan):
     """Then it is made again; a run holds times, so that what follows is made again, too."""
     assert unfit(plan) == {}
     do, fault = DAMAGES[damage]
@@ -121,7 +121,7 @@ def test_the_plan_names_the_damaged_file_and_its_reader_sets_it_aside(damage, pl
             jobs[path].make(jobs[path].outputs)
 
 
-def test_another_run_of_one_job_older_code_and_other_inputs_are_noticed(plan):
+def test_results_of_another_run_of_older_code_or_of_other_inputs_are_noticed(plan):
     """Each file has a valid checksum that tells where it comes from."""
     heldout = HELDOUT.at(RESULTS, scene=SCENE)
     shutil.copy2(RUN, heldout)

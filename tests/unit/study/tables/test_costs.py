@@ -28,7 +28,7 @@ def curve(folder, scene: str, offset: float, slope: float, full: float) -> File:
     return File(str(folder / f"{scene}.csv"), {})
 
 
-def test_every_line_has_its_own_break_even(tmp_path):
+def test_every_row_has_its_break_even_size(tmp_path):
     lines = {
         "a": (1.0, 0.1, 4.0), "b": (1.0, 0.1, 4.05), "c": (1.0, 0.1, 100.0), "d": (5.0, 0.1, 4.0),
         "e": (1.0, 0.03, 4.0),
@@ -70,7 +70,7 @@ def paid(reruns, *fewer: tuple, shares: tuple = (), by: str = "position") -> pd.
     return made[made.measure == by].reset_index(drop=True)
 
 
-def test_errors_are_those_of_the_fastest_accurate_run_or_of_the_most_accurate_one():
+def test_errors_are_those_of_the_fastest_accurate_run_or_of_the_most_accurate_run():
     runs = [("a", "deim", 0.01, 2.0, 0.2), ("a", "deim", 0.02, 8.0, 0.3)]
     runs += [("b", "deim", 0.03, 8.0, None), ("b", "deim", 1.0, 9.0, 0.2)]
     runs += [("c", "deim", 0.5, 9.0, 0.9), ("c", "deim", 0.6, 9.9, 0.2)]
@@ -86,7 +86,7 @@ def test_errors_are_those_of_the_fastest_accurate_run_or_of_the_most_accurate_on
     assert (row.least_speedup, row.best_speedup, row.most_speedup) == (4.0, 8.0, 8.0)
 
 
-def test_who_pays_is_scored_on_the_held_out_motions():
+def test_runs_that_are_faster_are_counted_on_the_test_trajectories():
     """Accurate and fast, accurate and slow, and fast but off by more than a tenth held out."""
     runs = [("a", "deim", 0.01, 2.0, 0.05), ("b", "deim", 0.02, 0.5, 0.05)]
     reruns = tables([*runs, ("c", "deim", 0.05, 4.0, 0.2)])
@@ -99,7 +99,7 @@ def test_who_pays_is_scored_on_the_held_out_motions():
     assert found == pytest.approx((0.025, 0.05, 0.075))
 
 
-def test_a_run_is_accurate_if_both_errors_are_and_their_reference_is_known():
+def test_a_run_is_accurate_if_both_errors_and_the_error_of_the_reference_are_small():
     """Scene a by position alone, c moves rigidly; b is known to a third of the limit, or half."""
     reruns = tables([(scene, "deim", 0.01, 2.0, 0.01) for scene in "abc"])
     reruns = reruns.assign(deformation_converged=[0.2, 0.05, None] * 2)
@@ -130,7 +130,7 @@ def test_effects_are_joined_in_one_time():
     assert effects_cost(none, none, none, times, NO_RUNS, HORIZON).empty
 
 
-def test_contributions_are_judged_before_the_horizon_and_bring_their_times():
+def test_contributions_cover_the_frames_before_the_horizon_and_have_times():
     """Two frames count; bending moves less than the floor, the only group of b cannot go."""
     forces = (("a", "spring", 3.0), ("a", "bending", 1.0), ("b", "strain", 4.0))
     rows = [
@@ -176,7 +176,7 @@ def test_contributions_are_judged_before_the_horizon_and_bring_their_times():
     assert pd.isna(by.ms_per_frame[("b", "kick")])
 
 
-def test_the_full_order_is_the_first_opponent_and_groups_without_force_do_not_count():
+def test_full_order_settings_are_compared_first_and_groups_without_force_ignored():
     fewer = [("a", 2, 0.2, 1.0), ("a", 5, 0.05, 2.0), ("b", 2, 0.3, 1.0), ("b", 10, 0.01, 4.0)]
     early = [(scene, "fom", "full", *rest) for scene, *rest in fewer]
     early += [("a", "coarser-mesh", "full", 20, 0.05, 3.0)]

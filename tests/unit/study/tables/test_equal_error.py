@@ -64,7 +64,7 @@ def made(folder, *recorded, runs=RUNS, cases=CASES, **changes) -> tuple[pd.DataF
     return alternatives([parts], times, [*recorded]), times
 
 
-def test_the_opponent_is_the_fastest_that_is_as_accurate(tmp_path):
+def test_the_comparison_is_the_fastest_run_that_is_as_accurate(tmp_path):
     table, times = made(tmp_path)
     assert len(table) == len(CASES) * len(RUNS)
     ten = table[(table.method == "projective") & (table.iterations == 10)]
@@ -93,7 +93,7 @@ def test_the_opponent_is_the_fastest_that_is_as_accurate(tmp_path):
     assert (equal_error(*blown, {"s": "springs"}, []).position_error == np.inf).all()
 
 
-def test_recorded_rows_of_other_meshes_are_beside_those_of_the_run(tmp_path):
+def test_recorded_rows_of_other_meshes_follow_those_of_the_run(tmp_path):
     table, times = made(tmp_path)
     record, elements = tmp_path / "record.csv", {"s": "springs"}
     for again, rows in (

@@ -12,7 +12,7 @@ from study.tables.errors import repetitions
 from study.tables.kit.results import median_interval
 
 
-def test_interval_is_that_of_the_binomial_distribution():
+def test_the_interval_of_a_median_is_that_of_the_binomial_distribution():
     """The bootstrap's median of odd n is at most the k-th value if n // 2 + 1 draws are."""
     n = 11
     _, low, high = median_interval(np.arange(1.0, n + 1))
@@ -41,7 +41,7 @@ def measured() -> pd.DataFrame:
     return pd.concat(processes)[COLUMNS]
 
 
-def test_each_scene_has_one_time_and_its_control(measured):
+def test_each_scene_has_one_time_and_one_control(measured):
     table = frame_times(measured).set_index("scene")
     assert table.ms_per_frame.to_dict() == {"a": 3.0, "a_twin": pytest.approx(3.3)}
     assert (table.processes == 3).all()
@@ -52,7 +52,7 @@ def test_each_scene_has_one_time_and_its_control(measured):
     assert np.isnan(table.twin_ratio["a_twin"])
 
 
-def test_a_speedup_stands_beside_its_costs_and_errors(measured):
+def test_a_speedup_is_listed_with_its_costs_and_errors(measured):
     models = {"scene": ["a"], "position_basis": ["pod"], "k": [4], "method": ["ecsw"]}
     steps = {"scene": ["a"], "group": ["spring"], "method": ["deim"], "r": [6]}
     files = {"projections": pd.DataFrame({**steps, "reduction_s": [0.1]}), "reruns": None}
@@ -86,11 +86,11 @@ def test_a_speedup_stands_beside_its_costs_and_errors(measured):
 
 
 @pytest.mark.parametrize("made", [frame_times, speedups, online, repetitions, scaling])
-def test_without_files_tables_are_empty(made):
+def test_tables_without_input_files_are_empty(made):
     assert made(**dict.fromkeys(made.reads, pd.DataFrame())).empty
 
 
-def test_repetitions_are_told_by_median_and_range():
+def test_repetitions_are_summarised_by_median_and_range():
     errors, gains = [0.2, 0.1, float("inf")], [4.0, 3.0, 5.0]
     rows = pd.DataFrame({"seed": [1, 2, 3], "error": errors, "gain": gains}).assign(
         scene="a", group="spring", method="deim", r=6, varied="training", finite=True
@@ -104,6 +104,6 @@ def test_repetitions_are_told_by_median_and_range():
 @pytest.mark.parametrize(
     ("share", "control", "said"), [(0.98, 1.1, False), (0.7, 1.1, True), (0.98, 1.7, True)]
 )
-def test_times_are_unreliable_without_a_processor_or_against_their_controls(share, control, said):
+def test_times_are_unreliable_without_a_processor_or_if_controls_differ(share, control, said):
     times = frame("control_low control_high processor_share", (1.0, control, share))
     assert unreliable(times) is said

@@ -45,7 +45,7 @@ def tables() -> tuple[pd.DataFrame, pd.DataFrame]:
     return pd.concat([runs, *others], ignore_index=True), pd.concat(reconstruction)
 
 
-def test_only_runs_whose_basis_suffices_count():
+def test_only_runs_with_a_sufficient_basis_count():
     runs = judged_runs(*tables())
     assert set(runs.scene) == {"calm", "quiet", "wild"}
     assert runs.set_index(["scene", "method"]).failed.to_dict() == {
@@ -92,7 +92,7 @@ def test_samples_and_coefficients_are_exchanged_at_equal_entries():
     assert cells["shared coefficients, three elements"].tolist() == [3, 3, 0, 0.3, 0.02]
 
 
-def test_interventions_compare_runs_on_one_basis():
+def test_interventions_compare_runs_with_the_same_basis():
     table = gain_interventions(*tables(), square())
     assert set(table.mesh) == {"all", "sheets"}  # no group of tetrahedra ran
     table = table[table.mesh == "sheets"].set_index("step")
@@ -106,7 +106,7 @@ def test_interventions_compare_runs_on_one_basis():
     assert "three elements a mode for one" not in table.index
 
 
-def test_scenes_count_once_however_many_sizes_they_have():
+def test_each_scene_counts_once_for_any_number_of_sizes():
     # one error of "u" rises so much that its mean would rise, its median falls
     ratios = {"s": [0.5] * 40, "t": [2.0] * 2, "u": [0.25, 0.25, 9.0], "v": [0.1] * 2, "w": [1, 1]}
     rows = [
@@ -131,7 +131,7 @@ def test_scenes_count_once_however_many_sizes_they_have():
     assert step.error_ratio_low < 0.5 <= step.error_ratio_high
 
 
-def test_an_error_is_the_median_over_the_motions_that_can_be_judged():
+def test_an_error_is_the_median_over_the_trajectories_that_can_be_judged():
     error = "relative_error_within_horizon"
     usual = {
         "scene": "a", "group": "g", "method": "pod", "position_basis": "full", "k": None,

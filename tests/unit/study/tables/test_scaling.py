@@ -20,7 +20,7 @@ JOINT = MethodSpec(title="joint DEIM", centring="affine", rows="joint")
 
 @pytest.mark.parametrize("sizes", [(100,), (100, 1000), (100, 1000, 10000)])
 @pytest.mark.parametrize("exponent", [0.0, 1.5])
-def test_a_power_law_has_its_exponent_if_there_are_three_sizes(sizes, exponent):
+def test_the_exponent_of_a_power_law_needs_three_sizes(sizes, exponent):
     law = 0.25 * np.power(sizes, exponent)
     rows = pd.DataFrame({"method": "fom", "vertices": sizes, "ms_per_iteration": law})
     row = scaling(rows.assign(scene="a").reindex(columns=ITERATIONS)).iloc[0]
@@ -30,7 +30,7 @@ def test_a_power_law_has_its_exponent_if_there_are_three_sizes(sizes, exponent):
 
 
 @pytest.mark.parametrize("name", ["strain_oop", "bar_release"])
-def test_every_size_is_measured(tmp_path, name):
+def test_every_mesh_size_is_measured(tmp_path, name):
     scene = read_scene(ROOT, name).coarsened(0.4, 1.0)
     alone = SizedBreakEven(sizes=(2, 3, 1000), training_frames=9, repeats=2)
     settings = SizedOptions(

@@ -16,7 +16,7 @@ FULL = {
 }  # fmt: skip
 
 
-def test_every_run_has_its_row_and_outcome(tmp_path):
+def test_every_run_has_one_row_with_its_outcome(tmp_path):
     """One scene with three sizes of one method, two subspace runs, and a sweep of two rows."""
     positions = np.zeros((4, 2, 3))
     positions[:, 1, 0] = [1.0, 1.1, 1.2, 0.9]
@@ -80,6 +80,6 @@ def test_every_run_has_its_row_and_outcome(tmp_path):
         (True, 2.4, 0.1, "accurate"),
     ],
 )
-def test_an_outcome_is_the_most_severe_that_fits(finite, extent, error, expected):
+def test_an_outcome_is_the_most_severe_one_that_applies(finite, extent, error, expected):
     row = FULL | {"method": "m", "finite": finite, "max_extent": extent, "relative_error": error}
     assert outcomes(pd.DataFrame([FULL, row]), 0.1, 2.0)[1] == expected

@@ -28,7 +28,7 @@ def basis_file(path, sigma, rank) -> File:
     return paths.BASIS.file(str(path))
 
 
-def test_singular_values_with_their_share_and_round_off(tmp_path):
+def test_singular_values_have_their_share_and_the_level_of_rounding_errors(tmp_path):
     bases = [
         basis_file(tmp_path / "pod" / "b_scene" / "spring" / "x.h5", [4.0, 1.0, 1e-12], 2),
         basis_file(tmp_path / "pod" / "a_scene" / "bending" / "x.h5", [0.0, 0.0], 0),
@@ -170,7 +170,7 @@ def files(tmp_path) -> dict[str, object]:
     }
 
 
-def test_what_users_look_at_before_the_horizon(files):
+def test_errors_of_positions_shapes_and_velocities_cover_the_frames_before_the_horizon(files):
     """Root mean squares before the horizon, which is 2 for scene a, over the norm of the extent."""
     table = trained(reduced_reruns(**files))
     assert table.error_over_extent[0] == pytest.approx(np.sqrt(0.025) / 2.0)
@@ -192,7 +192,7 @@ def error(difference, end) -> float:
     return np.linalg.norm(difference[:end]) / np.linalg.norm(DISPLACEMENT[:end])
 
 
-def test_errors_within_the_horizon_and_times(files):
+def test_reruns_have_their_errors_within_the_horizon_and_their_times(files):
     table = trained(reduced_reruns(**files))
     within = table.relative_error_within_horizon
     assert table.scene.tolist() == ["a", "a", "a", "b", "b", "b", "b"]
@@ -216,7 +216,7 @@ def test_errors_within_the_horizon_and_times(files):
     np.testing.assert_allclose(table.vertices_ms, np.array(expected) / 8)
 
 
-def test_held_out_runs_are_judged_by_their_own_horizon(files):
+def test_runs_of_a_test_trajectory_are_judged_up_to_its_horizon(files):
     table = reduced_reruns(**files)
     played = table[table.method == PLAYBACK].set_index(["motion", "scene"])
     assert played.relative_error.tolist() == pytest.approx([0.5] * 6)
@@ -273,13 +273,13 @@ def test_accuracy_cost_compares_all_runs_with_the_converged_one(files):
     assert found.reference_error.tolist() == [0.01] * 8
 
 
-def test_without_a_converged_run_there_is_no_point(files):
+def test_a_scene_without_a_converged_run_has_no_row(files):
     runs, none = reduced_reruns(**files), sweep(error_converged=np.nan)
     assert set(points(files, runs, none).method) == {"deim", "full", "ecsw-1e-02"}
     assert points(files, runs.assign(error_converged=None), none).empty
 
 
-def test_local_share_counts_assembly_and_is_the_share_of_the_whole_frame(files):
+def test_the_local_share_includes_assembly_and_refers_to_the_complete_frame(files):
     table = local_share(files["timings"], NOT_TIMED)
     assert table.scene.tolist() == ["a", "a", "a", "b"]
     assert table.implementation.tolist() == ["interpreted", "numpy", "compiled", "compiled"]

@@ -108,7 +108,7 @@ def test_rows_without_a_match_and_in_another_order_are_named(context):
     assert re.match(r"order of the rows: row 2 \(scene calm, ", moved)
 
 
-def test_a_row_behind_a_missing_one_keeps_its_number(context):
+def test_a_row_after_a_missing_one_keeps_its_number(context):
     found = runs().assign(stiffness=[*[2.0] * 5, 4.0, *[2.0] * 42]).drop(index=3)
     assert [text.split(" (")[0] for text in differences(found, context)] == ["row 4", "row 6"]
 
@@ -126,7 +126,7 @@ def test_a_diverged_run_may_be_missing_only_in_a_table_of_runs_with_an_error(con
     assert list(map(len, messages)) == [0, 1]
 
 
-def test_a_message_names_row_column_and_both_values(context):
+def test_a_difference_is_named_with_row_column_and_both_values(context):
     [text] = differences(runs().assign(stiffness=[4.0, *[2.0] * 47]), context)
     assert text == (
         "row 1 (scene calm, group all, method deim, r 1, elements_sampled 10, stiffness 2), "

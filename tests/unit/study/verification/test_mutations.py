@@ -65,7 +65,7 @@ def test_columns_of_larger_numbers_other_words_and_empty_cells_are_noticed(chang
     assert lost == []
 
 
-def test_changed_names_and_parameters_are_noticed(expected):
+def test_changed_labels_and_parameters_are_noticed(expected):
     """Each column of them in a row of its own."""
     lost = []
     for good in expected:

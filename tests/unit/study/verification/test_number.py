@@ -26,7 +26,7 @@ def last_run(tmp_path, monkeypatch):
     write_table(runs, results / "tables/runs.csv")
 
 
-def test_a_number_has_its_rows(last_run, capsys):
+def test_the_command_shows_the_rows_of_a_number(last_run, capsys):
     number(["--configfile", "config/own.yaml", "--", "worst"])
     said = capsys.readouterr().out
     assert "worst: 0.50 (unrounded: 0.5)" in said

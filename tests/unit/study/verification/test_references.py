@@ -51,13 +51,13 @@ def subject(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("reason", ["", "  \n"])
-def test_without_a_reason_nothing_is_updated(subject, reason):
+def test_references_are_not_updated_without_a_reason(subject, reason):
     with pytest.raises(ConfigurationError, match="a reason"):
         update(subject, reason)
 
 
 @pytest.mark.parametrize("content", [None, "scene\n"])
-def test_from_missing_or_damaged_tables_nothing_is_updated(subject, tmp_path, content):
+def test_references_are_not_updated_from_missing_or_damaged_tables(subject, tmp_path, content):
     folder = tmp_path / "results" / "studies" / "tiny" / "tables"
     folder.mkdir(parents=True)
     if content:

@@ -26,7 +26,7 @@ RESULTS = "results/studies/tiny"
 PAGE = Path(ARTICLE.at(RESULTS, name=VERIFIED))
 
 
-def test_expected_results_hold_and_outcomes_reach_an_article(results, subject, capsys):
+def test_expected_results_pass_and_an_article_shows_the_outcomes(results, subject, capsys):
     write_text("<!DOCTYPE html>", PAGE.with_name(INDEX))
     assert verify_tables(subject) == Status.HOLDS
     printed = capsys.readouterr().out.splitlines()
@@ -39,7 +39,7 @@ def test_expected_results_hold_and_outcomes_reach_an_article(results, subject, c
     assert "- claim C1: reproduced, " in page
 
 
-def test_a_verdict_that_times_have_changed_is_shown_and_not_judged(examination):
+def test_a_verdict_changed_by_times_is_shown_and_does_not_fail(examination):
     path = TABLE.at(RESULTS, name="local_share")
     slow = read_table(path).local_share.median() >= 0.7
     write_table(read_table(path).assign(local_share=0.1 if slow else 0.9), path)
@@ -61,7 +61,7 @@ def not_made_again(monkeypatch):
 
 
 @pytest.mark.usefixtures("not_made_again")
-def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject, capsys):
+def test_missing_results_have_a_distinct_exit_code_and_name_the_command(results, subject, capsys):
     reference = folder_of(RESULTS) / "error_budget.csv"
     kept = reference.read_bytes()
     for path in (TABLE.at(RESULTS, name="stability"), f"{RESULTS}/figures/ladder.png", reference):
@@ -79,7 +79,7 @@ def test_what_is_missing_has_its_own_code_and_names_its_command(results, subject
         assert any(one.startswith(line) and command in one for one in printed), line
 
 
-def test_the_code_is_that_of_the_worst_outcome():
+def test_the_exit_code_is_that_of_the_worst_outcome():
     """Of more and more outcomes, each worse than those before it."""
     order = "REPRODUCED", "NOT_COMPARABLE", "NO_REFERENCE", "DIFFERS", "MISSING"
     lines = [Line("table", "a", Outcome[name]) for name in order]
@@ -125,7 +125,7 @@ EDITS = {
 
 
 @pytest.mark.parametrize("name", EDITS)
-def test_an_edit_is_noticed(name, examination, monkeypatch):
+def test_an_edited_table_is_noticed(name, examination, monkeypatch):
     table, change, *place = EDITS[name]
     path = TABLE.at(RESULTS, name=table)
     write_table(change(read_table(path)), path)
@@ -138,7 +138,7 @@ def test_an_edit_is_noticed(name, examination, monkeypatch):
 
 
 @pytest.mark.usefixtures("not_made_again")
-def test_a_table_that_was_cut_one_that_is_lost_and_one_that_is_none_are_noticed(examination):
+def test_a_truncated_a_missing_and_an_invalid_table_are_noticed(examination):
     cut, lost, more = (TABLE.at(RESULTS, name=name) for name in ("ladder", "stability", "more"))
     content = Path(cut).read_bytes()
     with atomic_path(cut) as temporary:
@@ -150,7 +150,7 @@ def test_a_table_that_was_cut_one_that_is_lost_and_one_that_is_none_are_noticed(
     assert lines["stability"] is Outcome.MISSING
 
 
-def test_a_configuration_without_references_and_options_that_clash_are_refused(results, tmp_path):
+def test_a_configuration_without_references_and_conflicting_options_are_refused(results, tmp_path):
     own = tmp_path / "other.yaml"
     own.write_text("ranks: [6]\n")
     with pytest.raises(ConfigurationError, match="no expected tables of this configuration"):

@@ -75,7 +75,7 @@ def rewrite(change):
     write_text(json.dumps(content), path)
 
 
-def test_an_entry_has_checksums_and_what_made_the_file_and_equal_results_have_equal_entries():
+def test_a_manifest_entry_has_checksums_and_provenance_equal_for_equal_results():
     entries = read_manifest("results").files
     assert list(entries) == ["../paper/main.pdf", "fom/a/train.h5", "paper/m.tex", "tables/a.csv"]
     assert {(e.made_by, e.code_sha256) for e in entries.values()} == {("rule", "c0de")}
@@ -84,7 +84,7 @@ def test_an_entry_has_checksums_and_what_made_the_file_and_equal_results_have_eq
     assert Path("results/manifest.json").read_bytes() == before
 
 
-def test_intact_files_hold(capsys):
+def test_intact_files_pass(capsys):
     assert verify_files(SUBJECT) is Status.HOLDS
     assert "4 of 4 files" in capsys.readouterr().out
 
@@ -157,7 +157,7 @@ FAULTS = (
 @pytest.mark.parametrize(
     ("change", "name", "said"), [(c, name, said) for c, names, said in FAULTS for name in names]
 )
-def test_a_fault_is_noticed_and_its_command_named(change, name, said, monkeypatch, capsys):
+def test_a_faulty_file_is_noticed_and_the_command_is_named(change, name, said, monkeypatch, capsys):
     change(name, monkeypatch)
     status = verify_files(SUBJECT)
     found = capsys.readouterr().out
@@ -166,7 +166,7 @@ def test_a_fault_is_noticed_and_its_command_named(change, name, said, monkeypatc
     assert status is (Status.MISSING if missing else Status.DIFFERS)
 
 
-def test_outputs_of_one_name_stay_apart():
+def test_outputs_with_the_same_name_are_distinguished():
     """A page of the article has the name of a table's page in a folder of its own."""
     paths = {"page": "results/article/a.html", "other": "results/article/tables/a.html"}
     job = Job(PAGES, {}, {}, paths, {}, "", "")

@@ -99,7 +99,7 @@ def damages(content: bytes) -> Iterator[bytes]:
     yield from (content + more for more in (b"\0", b"\n", b"a,b\n"))
 
 
-def test_every_damage_is_noticed(result):
+def test_every_damage_of_a_result_is_noticed(result):
     content = result.read_bytes()
     for changed in {*damages(content)} - {content}:  # the last byte of an HDF5 file may be a zero
         assert noticed(result, changed)
@@ -114,7 +114,7 @@ def test_every_changed_bit_and_every_cut_of_the_checksum_is_noticed(result):
         assert noticed(result, checksum=changed)
 
 
-def test_the_checksum_tells_the_provenance_and_counts_without_it(result):
+def test_a_checksum_records_the_provenance_and_is_valid_without_it(result):
     assert provenance_of(result)["pdrom_version"] == __version__
     if result.suffix == ".h5":
         behind = hashlib.blake2b(result.read_bytes()[BLOCK:]).hexdigest()
@@ -126,7 +126,7 @@ def test_the_checksum_tells_the_provenance_and_counts_without_it(result):
     store.checksum_path(result).write_bytes(checksum)
 
 
-def test_a_copy_without_its_checksum_is_refused_and_left_alone_but_by_a_job(result, tmp_path):
+def test_only_a_job_renames_a_copy_that_lost_its_checksum_others_refuse_it(result, tmp_path):
     copy = Path(shutil.copy(result, tmp_path))
     if copy.suffix == ".h5":  # the checksum is inside
         read_one(copy)
@@ -144,7 +144,7 @@ def test_a_copy_without_its_checksum_is_refused_and_left_alone_but_by_a_job(resu
 @pytest.mark.parametrize(
     ("number", "aside"), [(errno.EIO, True), (errno.EACCES, False), (errno.ENOMEM, False)]
 )
-def test_only_what_the_disk_lost_is_set_aside(tmp_path, monkeypatch, number, aside):
+def test_only_damaged_files_are_renamed_not_unreadable_ones(tmp_path, monkeypatch, number, aside):
     """A file that may not be read, or not now, is not damaged."""
     path = tmp_path / "t.csv"
     write_result(path)

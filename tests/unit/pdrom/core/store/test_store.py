@@ -19,7 +19,7 @@ from pdrom.core.store import open_hdf5
 from pdrom.core.store.checksum import damaged_set_aside, new_checksum
 
 
-def test_a_complete_file_takes_the_name_and_who_reads_the_old_one_keeps_it(tmp_path):
+def test_a_complete_file_takes_the_name_while_readers_keep_the_old_file(tmp_path):
     path = tmp_path / "new" / "folder" / "result.txt"
     with store.atomic_path(path) as temporary:
         temporary.write_text("old")
@@ -40,7 +40,7 @@ LACKS = [OSError(n, os.strerror(n)) for n in (errno.ENOSPC, errno.EDQUOT, errno.
 @pytest.mark.parametrize("suffix", [".h5", ".csv"])
 @pytest.mark.parametrize("call", ["fsync", "replace"])
 @pytest.mark.parametrize("fault", [*LACKS, KeyboardInterrupt(), MemoryError()])
-def test_what_fails_is_named_an_interruption_handed_on_and_the_old_file_left(
+def test_a_failed_write_is_named_or_an_interrupt_raised_and_the_old_file_stays(
     tmp_path, monkeypatch, suffix, call, fault
 ):
     path = tmp_path / f"result{suffix}"
@@ -76,7 +76,7 @@ write_text("new", path)
 
 @pytest.mark.parametrize("existed", [False, True])
 @pytest.mark.parametrize("count", [0, 1])
-def test_a_kill_between_the_checksum_and_the_file_is_healed(tmp_path, existed, count):
+def test_a_kill_between_checksum_and_file_is_repaired_by_the_next_write(tmp_path, existed, count):
     """The old file is intact, or noticed as damaged; a file without a checksum is never left.
 
     What the killed process left goes with the next write, and nothing else.
@@ -98,7 +98,7 @@ def test_a_kill_between_the_checksum_and_the_file_is_healed(tmp_path, existed, c
 
 @pytest.mark.parametrize("kind", ["a link", "no regular file", "a folder"])
 @pytest.mark.parametrize("place", [store.require_own, lambda path: store.write_text("new", path)])
-def test_what_is_no_regular_file_is_refused_and_stays(tmp_path, kind, place):
+def test_a_path_that_is_no_regular_file_is_refused_and_stays(tmp_path, kind, place):
     path = tmp_path / "result.txt"
     if kind == "a link":
         (tmp_path / "other").write_text("mine")
@@ -130,7 +130,7 @@ def test_a_file_of_another_program_is_refused(tmp_path):
         store.require_own(path)
 
 
-def test_who_writes_the_same_file_at_once_keeps_the_own(tmp_path):
+def test_two_writers_of_one_file_do_not_see_each_other(tmp_path):
     path = tmp_path / "result.txt"
     with store.atomic_path(path) as first:
         first.write_text("first")
@@ -141,7 +141,7 @@ def test_who_writes_the_same_file_at_once_keeps_the_own(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["external", "soft", "storage", "virtual"])
-def test_a_file_that_reads_others_is_refused(tmp_path, kind):
+def test_an_hdf5_file_that_refers_to_other_files_is_refused(tmp_path, kind):
     path, other = tmp_path / "run.h5", tmp_path / "other.h5"
     with h5py.File(other, "w") as file:
         file["x"] = np.zeros(4)
@@ -173,7 +173,7 @@ TABLE = pd.DataFrame(
 )
 
 
-def test_table_round_trip(tmp_path):
+def test_a_table_is_read_as_it_was_written(tmp_path):
     """Empty cells and digits, too."""
     path = tmp_path / "t.csv"
     store.write_table(TABLE, path)
@@ -208,7 +208,7 @@ def test_faulty_tables_are_named(tmp_path, content, message):
     assert path.exists() == (content is not None)
 
 
-def test_missing_pieces_are_named(tmp_path):
+def test_missing_files_datasets_and_attributes_are_named(tmp_path):
     path = tmp_path / "few.h5"
     with pytest.raises(StorageError, match=r"few\.h5: no such file"), open_hdf5(path):
         pass
@@ -237,7 +237,7 @@ except StorageError as error:
 """
 
 
-def test_no_space_in_the_middle_of_a_file(tmp_path):
+def test_a_full_disk_in_the_middle_of_a_file_leaves_no_file(tmp_path):
     """The child process limits the size of its files, which acts like a full disk."""
     path = tmp_path / "result.h5"
     # the data file of the coverage measurement would exceed the limit, too
@@ -260,7 +260,7 @@ def plain(tmp_path):
     return path
 
 
-def test_a_file_without_a_checksum_inside_is_refused_unless_asked_for(plain):
+def test_a_file_without_a_checksum_inside_is_refused_unless_it_is_allowed(plain):
     assert store.check_file(plain) == "no checksum"
     expected = r"old\.h5: no checksum inside .*; --unchecked \(.*\) reads it if its data are valid$"
     with pytest.raises(StorageError, match=expected), open_hdf5(plain):

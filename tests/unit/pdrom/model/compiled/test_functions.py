@@ -24,7 +24,7 @@ def test_a_function_that_another_process_compiles_meanwhile_is_read(tmp_path, mo
     assert (made(3), made.stats.cache_hits.total()) == (6.0, 1)
 
 
-def test_loops_are_compiled_once_whatever_a_scene_holds():
+def test_loops_are_compiled_once_for_all_scenes():
     before = set(frames._frames.overloads)
     for more in ((), (LEFT,), (LEFT, {**LEFT, "select": "right"}, {**LEFT, "select": "top"})):
         trajectory(make_scene(GRAVITY, *more, {"effect": "spring", "weight": 1e3}, frames=2))

@@ -51,7 +51,7 @@ def _of(matrix, rows, count, vector, starts):
 
 
 @pytest.mark.parametrize("rows", [(0, 1, 2), (4, 0, 3), (2, 2, 2)])
-def test_rows_of_every_length(rows, rng):
+def test_products_are_exact_for_rows_of_every_length(rows, rng):
     for count in range(41):
         matrix = rng.integers(-99, 99, (5, count)).astype(float)
         vector = rng.integers(-99, 99, count).astype(float)
@@ -62,7 +62,7 @@ def test_rows_of_every_length(rows, rng):
 
 
 @pytest.mark.parametrize("place", [0, 17, 36])
-def test_what_is_not_a_number_stays_in_its_row(place):
+def test_a_nan_stays_in_its_row(place):
     matrix = np.ones((3, 37))
     matrix[1, place] = np.nan
     found = _of(matrix.ravel(), (0, 37, 74), 37, np.ones(37), (0.0, 0.0, 0.0))

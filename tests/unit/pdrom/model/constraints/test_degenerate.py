@@ -27,7 +27,7 @@ def group_of(name: str, count: int):
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_is_not_finite_stays_so_and_harms_no_other(kind, bad, rng):
+def test_an_element_that_is_not_finite_changes_no_other_element(kind, bad, rng):
     group = group_of(kind, 3 * LANES)
     f = rng.standard_normal((3 * LANES, group.rows_per_element, 3))
     clean = projected(group, f)
@@ -39,7 +39,7 @@ def test_what_is_not_finite_stays_so_and_harms_no_other(kind, bad, rng):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_element_has_the_same_bits_in_any_company(kind, rng):
+def test_an_element_has_the_same_bits_whichever_elements_share_its_block(kind, rng):
     """Neighbours in a block take part in the same loops, but change nothing."""
     count, alone = 2 * LANES + 3, group_of(kind, 1)
     noise = rng.standard_normal((count, alone.rows_per_element, 3))
@@ -75,7 +75,7 @@ def half_spheres(h: np.ndarray, n: np.ndarray, magnitude: float, compiled: bool)
     length=st.floats(-100.0, 100.0),
     magnitude=st.floats(1e-3, 1e3),
 )
-def test_no_bending_near_the_pole_leaves_its_half_sphere(
+def test_bending_near_the_pole_stays_in_its_half_sphere(
     compiled, seed, exponent, length, magnitude
 ):
     """H = -n + t u: the difference of H and its part along n is round-off for small t.
@@ -140,7 +140,7 @@ def matrices(draw, kind: str) -> np.ndarray:
 @pytest.mark.parametrize("kind", ROWS)
 @settings(max_examples=60)
 @given(data=st.data())
-def test_the_projection_is_in_range_and_as_near_as_bisection_finds(kind, data):
+def test_a_projection_is_in_range_and_as_near_as_the_nearest_point_by_bisection(kind, data):
     f = data.draw(matrices(kind))
     p = projected(GROUPS[kind], f)
     reference = GROUPS[kind].reference_project(f, np.arange(COUNT))
@@ -157,7 +157,7 @@ def test_the_projection_is_in_range_and_as_near_as_bisection_finds(kind, data):
 @pytest.mark.parametrize("kind", ROWS)
 @settings(max_examples=40)
 @given(data=st.data())
-def test_projecting_twice_changes_nothing_and_turns_commute(kind, data):
+def test_projecting_twice_changes_nothing_and_rotations_commute_with_projections(kind, data):
     """Q F projects to Q p, for a generic F: of others p need not be unique."""
     f = data.draw(matrices(kind))
     assume(np.abs(f).max() < 100.0)

@@ -30,7 +30,7 @@ CLAMPED = groups_on("clamped")
 KINDS = {name: EFFECTS.load(name) for name in (*CLAMPED, *groups_on("length"))}
 
 
-def test_groups_are_those_of_the_registry():
+def test_every_registered_group_is_tested():
     """A further group that says what it projects on is tested, without a list of names."""
     assert CLAMPED == ["strain", "tetrahedron_strain", "deformation_gradient"]
     assert groups_on("length") == ["spring"]
@@ -175,7 +175,7 @@ def test_projections_of_matrices_are_backward_stable(effect, ends, seed):
 
 
 @pytest.mark.parametrize("size", [1.0, 1e300, 1e-300, 1e-322, 0.0])
-def test_springs(size, rng):
+def test_projections_of_springs_are_accurate(size, rng):
     group = bound(KINDS["spring"], 1, 1)
     for _ in range(20):
         d = size * rng.standard_normal((1, 3)) * 10.0 ** rng.uniform(-8, 0, (1, 3))
@@ -198,7 +198,7 @@ CURVED = {
 
 
 @pytest.mark.parametrize("state", CURVED)
-def test_bending(state, rng):
+def test_projections_of_bending_are_accurate(state, rng):
     """The condition number: the terms that cancel in H = row y over |H|, and where H is on the
     wrong side, over the distance of its direction from the opposite pole."""
     mesh, kind = cloth(6, 6, "xz", wave=0.1), EFFECTS.load("bending")

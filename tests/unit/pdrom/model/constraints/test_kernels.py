@@ -61,7 +61,7 @@ def test_kernels_are_finite_deterministic_and_equal_the_numpy_reference(group_sc
 
 
 @pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
-def test_every_implementation_accumulates_the_same(group_scene, rng, implementation):
+def test_every_implementation_accumulates_the_same_force(group_scene, rng, implementation):
     group = group_scene.groups[0].for_run()
     y = group_scene.mesh.points + 0.05 * rng.standard_normal(group_scene.mesh.points.shape)
     group.begin_frame(y)
@@ -74,7 +74,7 @@ def test_every_implementation_accumulates_the_same(group_scene, rng, implementat
 
 
 @pytest.mark.parametrize("name", sorted(set(GROUPS) - {"bending"}))
-def test_a_group_may_keep_no_element(name):
+def test_a_group_may_be_restricted_to_no_element(name):
     group = make_scene({"effect": name, "weight": 1.0}, mesh=GROUPS[name]).groups[0]
     none = np.empty(0, dtype=np.int64)
     part, vertices = group.restricted(none, np.empty(0))
@@ -85,7 +85,7 @@ def test_a_group_may_keep_no_element(name):
 
 @settings(max_examples=10)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_a_shuffled_mesh_gets_neighbours_into_blocks(seed):
+def test_neighbours_of_a_shuffled_mesh_share_a_block(seed):
     mesh = cloth(20, 20)
     rng = np.random.default_rng(seed)
     cells = rng.permutation(400).astype(np.int32)[rng.permutation(mesh.triangles)]
@@ -97,7 +97,7 @@ def test_a_shuffled_mesh_gets_neighbours_into_blocks(seed):
 
 
 @pytest.mark.parametrize("effect", ["strain", "tetrahedron_strain", "deformation_gradient"])
-def test_what_others_see_is_in_the_order_of_the_mesh(effect):
+def test_results_of_a_group_are_in_the_element_order_of_the_mesh(effect):
     name = "disc.obj" if effect == "strain" else "torus.vtu"
     mesh = {"kind": "file", "path": f"config/scenes/meshes/{name}"}
     scene = make_scene({"effect": effect, "weight": 1e4}, mesh=mesh)

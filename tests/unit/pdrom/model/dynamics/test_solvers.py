@@ -21,7 +21,7 @@ NAMES = sorted(SOLVERS)
 
 @pytest.mark.parametrize("name", NAMES)
 @given(n=st.integers(1, 60), seed=st.integers(0, 2**31))
-def test_solves_like_the_dense_matrix(name, n, seed):
+def test_a_solver_gives_the_solution_of_the_dense_matrix(name, n, seed):
     """One factorisation serves many solves, and ignores later changes of the matrix."""
     rng = np.random.default_rng(seed)
     root = sparse.random_array((n, n), density=min(1.0, 4.0 / n), rng=rng, format="csr")
@@ -38,7 +38,7 @@ def test_solves_like_the_dense_matrix(name, n, seed):
 
 @pytest.mark.parametrize("pivot", [0.0, -1.0])
 @pytest.mark.parametrize("name", NAMES)
-def test_a_singular_or_indefinite_matrix_has_one_error(name, pivot):
+def test_a_singular_or_indefinite_matrix_raises_the_same_error_in_every_solver(name, pivot):
     """SuperLU factors an indefinite one without a word; a Cholesky factor it has none."""
     matrix = sparse.csr_array(np.diag([1.0, pivot, 2.0]))
     message = "size 3: not positive definite" if pivot else "size 3"
@@ -51,7 +51,7 @@ SCENE = make_scene({"effect": "spring", "weight": 1e4}, {"effect": "strain", "we
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("fixed", [[], [0], [0, 3, 17], list(range(29)), list(range(30))])
-def test_elimination_is_the_dense_block_solve(name, fixed, rng):
+def test_elimination_gives_the_solution_of_the_dense_block_system(name, fixed, rng):
     system = SCENE.system_with(name)
     fixed = np.array(fixed, dtype=np.int64)
     n = SCENE.mesh.vertices
@@ -71,7 +71,7 @@ def test_elimination_is_the_dense_block_solve(name, fixed, rng):
     np.testing.assert_allclose(y[free], expected, rtol=1e-9, atol=1e-9)
 
 
-def test_numbers_that_are_none_are_refused():
+def test_an_infinite_mass_is_refused():
     masses = SCENE.masses.copy()
     masses[4] = np.inf
     with pytest.raises(SolverError, match="global system"):
@@ -79,7 +79,7 @@ def test_numbers_that_are_none_are_refused():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_masses_that_round_off_swallows_are_refused_unless_a_body_is_held(name):
+def test_masses_below_rounding_errors_are_refused_unless_the_body_is_fixed(name):
     """A free body: nothing but inertia holds a translation, and inertia is lost in the matrix."""
     scene = make_scene({"effect": "spring", "weight": 1e6}, vertex_mass=1e-12)
     with pytest.raises(SolverError, match=r"for the weights|not positive definite"):
@@ -92,7 +92,7 @@ def test_masses_that_round_off_swallows_are_refused_unless_a_body_is_held(name):
     assert y == pytest.approx(scene.mesh.points, abs=1e-9)
 
 
-def test_residual_is_that_of_gmres(rng):
+def test_anderson_residuals_are_those_of_gmres(rng):
     """With an unlimited window step m + 1 is the image of the m-th iterate of GMRES (here by dense
     least squares over the Krylov space), of a symmetric contraction."""
     q, _ = np.linalg.qr(rng.standard_normal((12, 12)))
@@ -112,7 +112,7 @@ def test_residual_is_that_of_gmres(rng):
 
 
 @pytest.mark.parametrize("group", sorted(GROUPS))
-def test_same_fixed_point_and_monotone_objective(group):
+def test_acceleration_keeps_the_fixed_point_and_the_objective_falls(group):
     effects = ({"effect": group, "weight": 1e4}, GRAVITY)
     settings = {"mesh": GROUPS[group], "frames": 3}
     plain = trajectory(make_scene(*effects, **settings, iterations=2000))
@@ -124,7 +124,7 @@ def test_same_fixed_point_and_monotone_objective(group):
             assert rises.max() < 1e-9
 
 
-def test_a_risen_objective_brings_back_the_plain_image():
+def test_a_rising_objective_is_replaced_by_the_plain_iteration():
     acceleration, y = Anderson(3), np.ones((2, 3))
     acceleration.begin_frame(y)
     for objective in (2.0, 1.0):

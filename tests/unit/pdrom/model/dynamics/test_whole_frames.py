@@ -54,7 +54,7 @@ def assert_same(scene: Scene, loop: Stepper) -> None:
 
 
 @pytest.mark.parametrize("name", OWN)
-def test_frames_at_once_are_those_of_the_loop_in_few_calls(name):
+def test_frames_computed_at_once_equal_those_of_the_loop_and_need_few_calls(name):
     """A call does many frames where nothing is left to Python."""
     loop, calls = own(name).stepper(), []
     whole = loop._whole
@@ -72,7 +72,7 @@ def test_frames_at_once_are_those_of_the_loop_in_few_calls(name):
 
 
 @pytest.mark.parametrize("name", scene_names(ROOT))
-def test_scenes_of_the_catalogue_are_the_same(name):
+def test_scenes_of_the_study_have_the_same_frames_in_compiled_code(name):
     config = read_scene(ROOT, name, Coarsen(resolution=0.15, frames=0.3))
     scene, other = (Scene.build(config, config.mesh.build(ROOT)) for _ in range(2))
     assert_same(scene, other.stepper())

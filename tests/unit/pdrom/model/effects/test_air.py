@@ -90,7 +90,7 @@ def posed(points, offset, turn=(0, 0, 0)):
 
 @pytest.mark.parametrize("interpolation", ["linear", "smooth"])
 @pytest.mark.parametrize("start", [0, 3])
-def test_every_key_is_met(interpolation, start):
+def test_the_wind_has_the_value_of_every_keyframe(interpolation, start):
     scene = handle(interpolation=interpolation, start=start)
     run = trajectory(scene)
     held = scene.boundaries[0].vertices
@@ -105,7 +105,7 @@ def test_every_key_is_met(interpolation, start):
         assert run[start + 11, held] == pytest.approx(halfway, abs=1e-12)
 
 
-def test_smooth_has_no_kink_and_no_overshoot():
+def test_smooth_keyframes_have_no_kink_and_no_overshoot():
     keys = [{"at": 10, "offset": [0, 1, 0]}, {"at": 20, "offset": [0, 1, 0]}]
     scene = handle(keys=keys, interpolation="smooth")
     (boundary,) = scene.boundaries

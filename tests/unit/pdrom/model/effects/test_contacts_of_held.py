@@ -30,7 +30,7 @@ def warnings_of(scene, caplog) -> list[str]:
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
-def test_pins_inside_an_obstacle_hold_are_named_and_let_go_at_rest(name, caplog):
+def test_pins_inside_an_obstacle_stay_fixed_are_named_and_are_released_at_rest(name, caplog):
     """In all vertices and in a subspace."""
     scene = make_scene(*BASE, PINS, OBSTACLES[name], mesh=SHEET)
     held, rest = scene.boundaries[0].vertices, scene.mesh.points
@@ -52,7 +52,7 @@ def test_pins_inside_an_obstacle_hold_are_named_and_let_go_at_rest(name, caplog)
         assert model.positions(state.velocities)[held] == pytest.approx(0.0, abs=1e-10)
 
 
-def test_a_collision_moves_only_what_is_free(rng):
+def test_a_collision_moves_only_free_vertices(rng):
     """Close pairs with one held end: the other end gets the whole distance."""
     collision = {"effect": "self_collision", "thickness": 0.3}
     scene = make_scene(*BASE, PINS, collision, mesh=SHEET)
@@ -70,7 +70,7 @@ def test_a_collision_moves_only_what_is_free(rng):
     assert not np.array_equal(ended[held], positions[held])
 
 
-def test_targets_are_named_where_something_obstructs_them_later_and_nowhere_else(caplog):
+def test_targets_are_named_only_if_something_obstructs_them_later(caplog):
     for effects in (
         [PINS, {**FLOOR, "height": 0.6}],
         [PINS, {**OBSTACLES["plane"], "point": [0, 0.6, 0], "normal": [0, 0.3, 0]}],
@@ -95,7 +95,7 @@ def test_targets_are_named_where_something_obstructs_them_later_and_nowhere_else
         ({"effect": "self_collision", "thickness": 0.3}, 0, 0.0),
     ],
 )
-def test_free_vertices_inside_an_obstacle_are_a_warning(caplog, contact, count, far):
+def test_free_vertices_inside_an_obstacle_give_a_warning(caplog, contact, count, far):
     """The sheet hangs from y = 2.375 to y = 1.625; its left top corner is held."""
     pins = {"effect": "pins", "select": {"kind": "nearest", "point": [-1, 2.5, 0], "count": 1}}
     sheet = {"kind": "cloth", "rows": 5, "columns": 4}

@@ -31,7 +31,7 @@ def distance(name, points):
 
 @pytest.mark.parametrize("name", OBSTACLES)
 @given(seed=SEEDS, size=st.floats(-3, 4), friction=st.sampled_from([0.0, 0.3, np.inf]))
-def test_nothing_ends_inside(name, seed, size, friction):
+def test_no_vertex_ends_inside_an_obstacle(name, seed, size, friction):
     """From anywhere, outside or inside, with paths of any length."""
     rng = np.random.default_rng(seed)
     before = rng.uniform(-1.5, 1.5, (200, 3))
@@ -43,7 +43,7 @@ def test_nothing_ends_inside(name, seed, size, friction):
 
 @pytest.mark.parametrize("name", OBSTACLES)
 @given(seed=SEEDS, size=st.floats(-3, 4))
-def test_paths_that_miss_are_left_alone(name, seed, size):
+def test_paths_that_miss_the_obstacle_are_unchanged(name, seed, size):
     rng = np.random.default_rng(seed)
     before = rng.uniform(-3.0, 3.0, (100, 3))
     after = before + 10.0**size * rng.standard_normal((100, 3))
@@ -58,7 +58,7 @@ def test_paths_that_miss_are_left_alone(name, seed, size):
 
 @pytest.mark.parametrize("name", OBSTACLES)
 @pytest.mark.parametrize("path", [0.0, 5e-324, 1e-300])
-def test_a_path_of_nothing_is_no_special_case(name, path):
+def test_a_path_of_length_zero_is_no_special_case(name, path):
     """Inside, outside and on the surface of the box."""
     before = np.array([[0.0, 0.0, 0.0], [5.0, 5.0, 5.0], [0.7, 0.0, 0.0], [0.7, 0.6, 0.5]])
     after = before + path
@@ -71,7 +71,7 @@ def test_a_path_of_nothing_is_no_special_case(name, path):
 
 @pytest.mark.parametrize("name", OBSTACLES)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
-def test_no_path_passes_through(name, friction, rng):
+def test_no_path_passes_through_an_obstacle(name, friction, rng):
     """Aimed at the middle from outside, ten thousand metres a frame: it stays on its side."""
     middle = np.array([0.1, 0.2, 0.3])
     direction = rng.standard_normal((300, 3))
@@ -96,7 +96,7 @@ def falling(contact, q, v, frames):
     return q, v
 
 
-def test_a_plate_without_thickness_holds_what_falls_on_it():
+def test_a_plate_without_thickness_stops_vertices_that_fall_on_it():
     plate = obstacle("box", lower=[-2, 1, -2], upper=[2, 1, 2], friction=0.5)
     q, v = falling(plate, [[0.1, 1.2, 0.0]], [[1.0, -3.0, 0.0]], frames=100)
     assert q[0, 1] == 1.0
@@ -104,7 +104,7 @@ def test_a_plate_without_thickness_holds_what_falls_on_it():
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.1, 0.4, 0.6, 10.0, np.inf])
-def test_friction_on_a_slope_is_coulombs(mu):
+def test_friction_on_a_slope_follows_coulombs_law(mu):
     """A point glides down a plane of 30 degrees with g (sin - mu cos), or stays: tan is 0.577."""
     tilt = np.radians(30.0)
     slope = obstacle("plane", mu, point=[0, 0, 0], normal=[np.sin(tilt), np.cos(tilt), 0])
@@ -126,7 +126,7 @@ def body(name):
 
 
 @pytest.mark.parametrize("name", BODIES)
-def test_corners_are_on_the_surface_that_keeps_vertices_out(name):
+def test_drawn_corners_of_an_obstacle_lie_on_its_surface(name):
     (contact,) = make_scene(SPRING, {"effect": name, **BODIES[name]}).contacts
     assert np.abs(depths(contact, body(name).points)).max() < 1e-12
     inside, outside = depths(contact, np.array([[0.0, 0.0, 0.3], [0.0, 9.0, 0.0]]))

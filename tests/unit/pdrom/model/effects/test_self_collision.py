@@ -34,7 +34,7 @@ def closest(scene, positions):
     "start",
     [{"folded": True}, {"folded": True, "noise": 1e-3}, {"scrambled": 1.0}, {"mapped": [0, 0, 0]}],
 )
-def test_no_pair_ends_closer_than_nine_tenths(start):
+def test_no_pair_ends_closer_than_90_percent_of_the_thickness(start):
     """A sheet that falls on the floor as a heap: vertices coincide at the start."""
     scene = sheet(GRAVITY, {"effect": "floor"})
     loop, state = scene.stepper(), start_of(scene, **start)
@@ -45,7 +45,7 @@ def test_no_pair_ends_closer_than_nine_tenths(start):
 
 
 @given(seed=SEEDS)
-def test_the_response_is_symmetric(seed):
+def test_a_collision_keeps_the_centre_of_mass(seed):
     """The centre of mass of light and heavy vertices stays; each moves by its inverse mass."""
     rng = np.random.default_rng(seed)
     scene = sheet(masses=[{"select": "left", "vertex_mass": 500.0}])
@@ -59,7 +59,7 @@ def test_the_response_is_symmetric(seed):
     assert closest(scene, ended) >= 0.9
 
 
-def test_a_pair_that_passed_is_put_back():
+def test_a_pair_that_passed_through_each_other_is_put_back():
     """Two layers a tenth of the thickness beyond each other end in their old order."""
     scene = sheet()
     (contact,) = scene.contacts
@@ -73,7 +73,7 @@ def test_a_pair_that_passed_is_put_back():
     assert after[upper, 1].min() > after[~upper, 1].max()
 
 
-def test_a_thickness_that_lets_vertices_pass_is_said_in_the_log_and_mended_by_what_it_says(caplog):
+def test_the_log_names_a_thickness_that_is_too_small_and_one_that_suffices(caplog):
     with caplog.at_level(logging.WARNING):
         sheet().log_contacts()
         assert caplog.messages == []
@@ -84,7 +84,7 @@ def test_a_thickness_that_lets_vertices_pass_is_said_in_the_log_and_mended_by_wh
     assert message.endswith(f"effect 'self_collision': {said}")
 
 
-def test_a_position_subspace_refuses_it():
+def test_a_position_subspace_refuses_self_collision():
     scene = sheet()
     columns = make_columns([scene], scene.mesh.points[None], skinning=4)
     with pytest.raises(NotReducibleError, match="effect 'self_collision': needs all vertices"):

@@ -60,7 +60,7 @@ def report(group: str) -> dict:
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_a_scene_without_it_neither_imports_it_nor_holds_more_once_it_is_loaded(effect):
+def test_a_scene_neither_imports_an_unlisted_effect_nor_allocates_memory_for_it(effect):
     """The same compiled functions of its own, arrays and bytes, and the same bits of its run."""
     group = other_group(effect)
     found = report(group)
@@ -79,7 +79,7 @@ def test_a_scene_without_it_neither_imports_it_nor_holds_more_once_it_is_loaded(
 
 
 @pytest.mark.parametrize("effect", [name for name in EFFECTS if IDLE.get(name, {}) is not None])
-def test_what_cannot_act_changes_no_bit(effect):
+def test_an_effect_that_cannot_act_changes_no_bit(effect):
     """Of a sheet that falls, held on one side, with a start off its rest shape."""
     if issubclass(EFFECTS.load(effect), ConstraintGroup):
         check_group(effect)
@@ -115,7 +115,7 @@ def check_group(effect):
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_a_scene_depends_on_the_code_of_its_own_effects_only(scene):
+def test_a_scene_depends_only_on_the_code_of_effects_that_it_lists(scene):
     """Fingerprints of its jobs cover these modules; an edit of another effect reruns nothing."""
     config = read_scene(ROOT, scene)
     covered = set(closure("study.experiments.fom", *config.modules))
@@ -127,7 +127,7 @@ def test_a_scene_depends_on_the_code_of_its_own_effects_only(scene):
 
 
 @pytest.mark.parametrize("effect", IDLE)
-def test_a_configuration_survives_the_way_to_a_job(effect):
+def test_a_job_gets_the_configuration_of_the_scene_unchanged(effect):
     """As plain JSON, with a shape as selection and friction without end where there are any."""
     entry: dict = {"effect": effect, **(IDLE[effect] or {})}
     ball = {"kind": "sphere", "centre": [0, 2, 0], "radius": 0.5}

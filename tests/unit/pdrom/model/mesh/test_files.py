@@ -32,7 +32,7 @@ def replaced(monkeypatch: pytest.MonkeyPatch, script: str) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".vtu"])
-def test_a_file_is_read_wherever_it_lies(tmp_path, suffix):
+def test_a_mesh_file_is_read_in_any_folder(tmp_path, suffix):
     """By the reader's process, also where the path holds a blank and letters beyond ASCII.
 
     It starts a process; without one `test_guards` reads all formats.
@@ -45,7 +45,7 @@ def test_a_file_is_read_wherever_it_lies(tmp_path, suffix):
     assert np.array_equal(loaded.triangles, mesh.triangles)
 
 
-def test_readers_open_no_second_file(tmp_path, monkeypatch):
+def test_readers_of_meshes_open_no_second_file(tmp_path, monkeypatch):
     """Neither of files beside the mesh nor of those that the mesh names."""
     contents = {}
     for suffix in reader.READERS:
@@ -59,7 +59,7 @@ def test_readers_open_no_second_file(tmp_path, monkeypatch):
     assert all(len(read(contents[suffix]).points) for suffix, read in reader.READERS.items())
 
 
-def test_a_file_that_takes_long(square, monkeypatch):
+def test_a_mesh_file_that_takes_too_long_is_refused(square, monkeypatch):
     """The limit of processor time ends the process that reads it."""
     limited(monkeypatch, seconds=1)
     replaced(monkeypatch, "import resource\nresource.setrlimit(0, (1, 1))\nwhile True:\n    pass")
@@ -67,7 +67,7 @@ def test_a_file_that_takes_long(square, monkeypatch):
         read_mesh_file(square)
 
 
-def test_a_small_file_that_unpacks_to_gigabytes(tmp_path, monkeypatch):
+def test_a_small_mesh_file_that_unpacks_to_gigabytes_is_refused(tmp_path, monkeypatch):
     limited(monkeypatch, memory=600_000_000)
     path = tmp_path / "zeros.vtu"
     path.write_text(zeros_vtu(160))
@@ -84,7 +84,7 @@ def test_a_small_file_that_unpacks_to_gigabytes(tmp_path, monkeypatch):
         ({"file_bytes": 10}, "larger than 10 bytes"),
     ],
 )
-def test_large_meshes_are_named(square, monkeypatch, limit, message):
+def test_a_mesh_above_the_limits_is_refused(square, monkeypatch, limit, message):
     limited(monkeypatch, **limit)
     with pytest.raises(MeshError, match=message):
         read_mesh_file(square)
@@ -98,20 +98,20 @@ def test_large_meshes_are_named(square, monkeypatch, limit, message):
         ("raise SystemExit(7)", "failed with status 7: no error message"),
     ],
 )
-def test_a_reader_that_ends_early_is_named(square, monkeypatch, script, message):
+def test_a_mesh_whose_reader_crashes_is_named(square, monkeypatch, script, message):
     replaced(monkeypatch, script)
     with pytest.raises(MeshError, match=f"square.obj: the reader .*{message}"):
         read_mesh_file(square)
 
 
-def test_a_reader_that_waits_is_ended(square, monkeypatch):
+def test_a_reader_that_waits_is_stopped(square, monkeypatch):
     limited(monkeypatch, deadline=0)
     replaced(monkeypatch, "import signal\nsignal.pause()")
     with pytest.raises(MeshError, match=r"square\.obj: not read after 0 s"):
         read_mesh_file(square)
 
 
-def test_a_file_is_read_once_as_long_as_it_stays(square, monkeypatch):
+def test_an_unchanged_mesh_file_is_read_once(square, monkeypatch):
     started = []
     run = subprocess.run
     monkeypatch.setattr(
@@ -126,7 +126,7 @@ def test_a_file_is_read_once_as_long_as_it_stays(square, monkeypatch):
     assert len(started) == 2
 
 
-def test_the_environment_raises_all_limits(monkeypatch):
+def test_environment_variables_raise_all_limits(monkeypatch):
     monkeypatch.delenv("PDROM_MESH_LIMITS", raising=False)
     plain = mesh_limits()
     monkeypatch.setenv("PDROM_MESH_LIMITS", "2.5")

@@ -21,7 +21,7 @@ CUTS = 25
 
 @pytest.mark.parametrize(("writer", "suffix", "more"), VARIANTS)
 @pytest.mark.parametrize("kind", ["triangle", "tetra"])
-def test_what_is_written_is_read_and_what_is_cut_is_not(tmp_path, writer, suffix, more, kind):
+def test_complete_files_are_exact_and_cut_files_are_refused(tmp_path, writer, suffix, more, kind):
     if kind == "tetra" and suffix not in VOLUMES:
         pytest.skip("a format of surfaces")
     path = tmp_path / f"mesh{suffix}"

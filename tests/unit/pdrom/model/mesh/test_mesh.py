@@ -52,7 +52,7 @@ def test_bar_has_the_counts_of_the_study():
     assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0 == pytest.approx(volume.sum())
 
 
-def test_round_trip(tmp_path):
+def test_a_mesh_is_read_as_it_was_written(tmp_path):
     mesh = bar(4, 3, 3)
     save_mesh(mesh, tmp_path / "mesh.h5")
     loaded = load_mesh(tmp_path / "mesh.h5")
@@ -78,7 +78,7 @@ BOTH = np.concatenate([OPEN, CLOSED + OPEN.max() + 1])
 
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 0.4))
 @pytest.mark.parametrize("triangles", [OPEN, CLOSED, BOTH], ids=["sheet", "closed", "two parts"])
-def test_the_fewer_ones_are_turned(triangles, seed, share):
+def test_the_smaller_number_of_inconsistent_triangles_is_reversed(triangles, seed, share):
     rng = np.random.default_rng(seed)
     count = int(share * min(len(OPEN), len(CLOSED)))
     flipped = np.zeros(len(triangles), dtype=bool)
@@ -106,7 +106,7 @@ def one_cell(corners: np.ndarray) -> Mesh:
 
 
 @given(corners=cells(3, 0.0) | cells(4, 0.0))
-def test_degenerate_cells_are_refused(corners):
+def test_cells_without_volume_are_refused(corners):
     """Collinear and coplanar up to rounding of the corners."""
     with pytest.raises(DegenerateElementError, match="has zero"):
         check_mesh(one_cell(corners), "mesh")
@@ -124,7 +124,7 @@ def test_slivers_and_cells_of_any_size_are_not_refused(sliver, corners):
     [("sheet", "spring"), ("sheet", "strain"), ("sheet", "bending"), ("bar", "spring"),
      ("bar", "tetrahedron_strain"), ("bar", "deformation_gradient")],
 )  # fmt: skip
-def test_wild_meshes_rest_in_themselves(shape, effect, data):
+def test_distorted_meshes_are_at_rest_in_their_rest_shape(shape, effect, data):
     """S at rest projects on itself: the elastic force vanishes for any mesh."""
     mesh = data.draw(wild_meshes(shape))
     scene = build(mesh, {"effect": effect, "weight": 1.0}, frames=1)
@@ -144,7 +144,7 @@ def read(folder: Path, points: np.ndarray, **cells: np.ndarray) -> Mesh:
     return MeshFile(kind="file", path="mesh.vtu").build(folder)
 
 
-def test_cells_the_other_way_round_are_turned_and_triangles_said(tmp_path, caplog):
+def test_reversed_cells_are_reordered_and_reversed_triangles_are_reported(tmp_path, caplog):
     cells = BAR.tetrahedra.copy()
     cells[1] = cells[1][[1, 0, 2, 3]]
     corner = (mesh := read(tmp_path, BAR.points, tetra=cells)).points[mesh.tetrahedra]
@@ -158,7 +158,7 @@ def test_cells_the_other_way_round_are_turned_and_triangles_said(tmp_path, caplo
 
 @pytest.mark.parametrize("joined", [False, True], ids=["two components", "joined in one vertex"])
 @pytest.mark.parametrize("effect", ["spring", "strain", "bending"])
-def test_parts_without_a_common_edge_are_taken(tmp_path, joined, effect):
+def test_a_mesh_of_separate_parts_is_accepted(tmp_path, joined, effect):
     """Two sheets rest where nothing pulls, and move where something does."""
     other = SHEET.points + (1.0 if joined else 1.5) * np.array([1.0, 0.0, 1.0])
     # the last vertex of the first sheet may be the first of the second

@@ -45,7 +45,7 @@ def square(path: Path, content: str | bytes) -> None:
         (V + "g H\u00fclle\nf 1 2 3\nfo 1 3 4\n").encode("latin-1"),
     ],
 )
-def test_obj(tmp_path, content):
+def test_faces_of_an_obj_file_are_read(tmp_path, content):
     square(tmp_path / "a.obj", content)
 
 
@@ -68,7 +68,7 @@ def test_obj(tmp_path, content):
         (V + "v 2 0 0\nv 2 0 1\nf 1 2 3\nf 1 2 3 4\nf 1 2 5 6", "truncated"),
     ],
 )
-def test_faulty_obj(tmp_path, content, why):
+def test_a_faulty_obj_file_is_refused(tmp_path, content, why):
     (tmp_path / "a.obj").write_text(content)
     found = refusal(tmp_path / "a.obj")
     assert any(all(word in found for word in part.split(" .* ")) for part in why.split("|")), found
@@ -176,7 +176,7 @@ def test_plain_files_are_read(tmp_path, name, content):
         ("a.vtk", legacy("UNSTRUCTURED_GRID", f"CELLS 2 {10**12}\n{FACES}"), "not a readable mesh"),
     ],
 )  # fmt: skip
-def test_what_else_there_is_is_refused(tmp_path, name, content, why):
+def test_other_cells_and_formats_are_refused(tmp_path, name, content, why):
     (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
     assert why in refusal(tmp_path / name)
 
@@ -193,7 +193,7 @@ def medit(axes: int, vertices: list, **sections: list) -> str:
 CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
 
 
-def test_surfaces_beside_tetrahedra_are_left_out_if_they_are_faces(tmp_path):
+def test_surface_triangles_of_tetrahedra_are_left_out_if_they_are_faces(tmp_path):
     path = tmp_path / "a.mesh"
     solid = {"Tetrahedra": [[1, 2, 3, 4]], "Quadrilaterals": [[1, 2, 3, 4]]}
     path.write_text(medit(3, CORNERS, Triangles=[[1, 3, 2], [1, 2, 4]], **solid))
@@ -273,7 +273,7 @@ def binary_stl(head: bytes, tail: bytes = b"") -> bytes:
         binary_stl(b"solid by x"), binary_stl(b"x", tail=b"\0\0\0"),
     ],
 )  # fmt: skip
-def test_stl(tmp_path, content):
+def test_an_stl_file_is_read_and_a_cut_one_is_refused(tmp_path, content):
     path = tmp_path / "a.stl"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     points, cells = read_here(path)
@@ -323,7 +323,7 @@ def piece(count: int) -> str:
 VTU = '<VTKFile type="UnstructuredGrid"><UnstructuredGrid>{}</UnstructuredGrid></VTKFile>'
 
 
-def test_pieces_of_a_vtu_are_joined_and_what_follows_its_end_is_left_out(tmp_path):
+def test_pieces_of_a_vtu_are_joined_and_bytes_behind_its_end_are_ignored(tmp_path):
     square(tmp_path / "a.vtu", VTU.format(piece(2) + piece(0)) + "\n<!-- x -->\0\0")
     (tmp_path / "a.vtu").write_text(VTU.format(piece(1) + piece(2)))
     points, cells = read_here(tmp_path / "a.vtu")

@@ -40,13 +40,13 @@ def disc_with_holes():
     ],
     ids=["box", "sphere", "plane of any length of normal"],
 )  # fmt: skip
-def test_a_shape_holds_what_is_inside(selection, holds):
+def test_a_shape_selects_the_vertices_inside(selection, holds):
     expected = [v for v, point in enumerate(SHEET.points) if holds(point)]
     assert chosen(selection) == expected != []
 
 
 @pytest.mark.parametrize("point", [0, 13, 29])
-def test_nearest(point):
+def test_the_nearest_vertices_of_a_point_are_selected(point):
     near = SHEET.points[point] + [0.01, -0.01, 3.0]
     assert chosen({"kind": "nearest", "point": near.tolist()}) == [point]
     five = chosen({"kind": "nearest", "point": near.tolist(), "count": 5})
@@ -57,7 +57,7 @@ def test_nearest(point):
     assert chosen({"kind": "nearest", "point": [0, 2, 0], "count": 2}, square) == [1, 4]
 
 
-def test_boundary_loops_from_the_longest():
+def test_boundary_loops_are_numbered_from_the_longest():
     mesh = disc_with_holes()
     loops = [chosen({"kind": "boundary_loop", "index": i}, mesh) for i in range(3)]
     rim = {v for side in ("left", "right", "back", "front") for v in chosen(side, mesh)}
@@ -70,7 +70,7 @@ def test_boundary_loops_from_the_longest():
         chosen({"kind": "boundary_loop"}, bar(3, 3, 3))
 
 
-def test_components_from_the_largest():
+def test_components_are_numbered_from_the_largest():
     small, large = cloth(3, 3, "xz"), cloth(4, 4, "xz")
     points = np.concatenate([small.points, large.points + np.array([5.0, 0.0, 0.0])])
     mesh = Mesh(points, np.concatenate([small.triangles, large.triangles + 9]).astype(np.int32))
@@ -78,7 +78,7 @@ def test_components_from_the_largest():
     assert chosen({"kind": "component", "index": 1}, mesh) == list(range(9))
 
 
-def test_combinations_are_those_of_sets():
+def test_combinations_of_selections_are_those_of_sets():
     left, top, ball = "left", [1, 2, 3, 7], {"kind": "sphere", "centre": [0, 2.5, 0], "radius": 0.4}
     sets = [set(chosen(part)) for part in (left, top, ball)]
     assert set(chosen({"kind": "union", "of": [left, top, ball]})) == set.union(*sets)

@@ -90,7 +90,7 @@ def published_modes(p: np.ndarray, signs: np.ndarray) -> np.ndarray:
     return modes
 
 
-def test_mean_in_modes_follows_the_recipe():
+def test_the_mean_among_the_modes_follows_the_published_recipe():
     p, _ = snapshots(17)
     basis = basis_of(p, BasisSpec(centring="mean-in-modes"))
     wanted = published_modes(p, np.ones(len(p)))
@@ -102,7 +102,7 @@ def test_mean_in_modes_follows_the_recipe():
         )
 
 
-def test_mean_in_modes_spans_another_space_with_other_signs():
+def test_the_mean_among_the_modes_gives_another_space_for_other_signs():
     p, _ = snapshots(19)
     spec = BasisSpec(centring="mean-in-modes")
     fixed = basis_of(p, spec)
@@ -137,7 +137,7 @@ def test_tiny_and_huge_snapshots_have_the_basis_of_ordinary_ones(spec):
 @given(seed=SEEDS, n=st.integers(2, 40), exponent=st.integers(-8, 8))
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("weighting", WEIGHTINGS)
-def test_constant_snapshots_have_no_basis_but_a_mean(weighting, layout, seed, n, exponent):
+def test_constant_snapshots_have_a_mean_and_no_modes(weighting, layout, seed, n, exponent):
     """What a computed mean leaves is round-off, for every number of snapshots and every scale."""
     one, mass = snapshots(seed, 1)
     p = np.repeat(one, n, axis=0) * 10.0**exponent
@@ -160,7 +160,7 @@ def test_a_flat_axis_gets_no_modes_and_is_flagged(spec, rng):
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_numbers_that_are_none_are_named(bad):
+def test_snapshots_that_are_not_finite_are_refused(bad):
     p, _ = snapshots(29)
     p[2, 3, 1] = bad
     with pytest.raises(SnapshotError, match=r"\(2, 3, 1\)"):
@@ -168,13 +168,13 @@ def test_numbers_that_are_none_are_named(bad):
 
 
 @pytest.mark.parametrize("shape", [(1, 12, 3), (5, 12), (5, 12, 2), (5, 0, 3), (5, 11, 3)])
-def test_wrong_shapes_are_named(shape):
+def test_snapshots_of_wrong_shape_are_refused(shape):
     with pytest.raises(SnapshotError, match="required"):
         compute_basis(np.ones(shape), np.ones(shape[1]), 0.0, 3, BasisSpec())
 
 
 @pytest.mark.parametrize("mass", [0.0, -1.0, np.nan])
-def test_rows_without_mass_are_named(mass):
+def test_rows_without_mass_are_refused(mass):
     p, masses = snapshots(31)
     masses[4] = mass
     for faulty, spec in ((masses, BasisSpec(weighting="mass")), (masses[1:], BasisSpec())):
@@ -183,7 +183,7 @@ def test_rows_without_mass_are_named(mass):
 
 
 @every_spec
-def test_file_round_trip(spec, tmp_path):
+def test_a_basis_is_read_as_it_was_written(spec, tmp_path):
     path = tmp_path / "scene" / "group" / f"{spec.basis_id}.h5"
     basis = basis_of(snapshots(41)[0], spec)
     save_basis(basis, path)

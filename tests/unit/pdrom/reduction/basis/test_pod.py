@@ -45,7 +45,7 @@ def test_small_singular_values_survive_where_the_gram_matrix_loses_them(rng):
     np.testing.assert_allclose(pod(q * wanted @ w.T)[1], wanted, rtol=1e-2)
 
 
-def test_agrees_with_pymor(rng):
+def test_modes_and_singular_values_are_those_of_pymor(rng):
     matrix = rng.standard_normal((200, 12)) * np.logspace(0, -3, 12)
     modes, sigma = pymor_pod(NumpyVectorSpace(200).from_numpy(matrix), method="qr_svd", rtol=0.0)
     u, ours = pod(matrix)
@@ -53,7 +53,7 @@ def test_agrees_with_pymor(rng):
     np.testing.assert_allclose(u, fix_signs(modes.to_numpy()), atol=1e-9)
 
 
-def test_first_of_tied_entries_decides_the_sign():
+def test_the_first_of_equally_large_entries_determines_the_sign():
     u = np.array([[-0.5, 0.5], [0.5 * (1.0 + 1e-12), -0.5 * (1.0 + 1e-12)]])
     np.testing.assert_array_equal(fix_signs(u), u * [-1.0, 1.0])
     for shape in ((7, 0), (0, 0)):
@@ -61,7 +61,7 @@ def test_first_of_tied_entries_decides_the_sign():
 
 
 @given(SHAPES, SEEDS)
-def test_signs_do_not_depend_on_those_of_the_input(shape, seed):
+def test_signs_of_modes_do_not_depend_on_signs_of_the_input(shape, seed):
     matrix = matrix_of(shape)
     flips = np.random.default_rng(seed).choice([-1.0, 1.0], matrix.shape[1])
     np.testing.assert_array_equal(fix_signs(matrix), fix_signs(matrix * flips))
@@ -85,7 +85,7 @@ EPS = np.finfo(float).eps
         ([1.0, 11 * EPS, 9 * EPS], (8, 8), 0.0, 3),
     ],
 )
-def test_counts_what_is_above_both_levels(sigma, shape, roundoff, rank):
+def test_the_numerical_rank_counts_singular_values_above_both_levels(sigma, shape, roundoff, rank):
     assert numerical_rank(np.array(sigma), shape, roundoff) == rank
 
 
@@ -102,7 +102,7 @@ def check(matrix: np.ndarray) -> None:
 
 
 @given(SHAPES, st.sampled_from([1e-290, 1.0, 1e140]))
-def test_is_a_factorisation_with_orthonormal_columns(shape, scale):
+def test_qr_gives_orthonormal_columns_whose_product_is_the_matrix(shape, scale):
     """Of a tall matrix whose columns have very different sizes, the last one dependent."""
     n, m, seed = shape
     matrix = matrix_of((n + m, m, seed))

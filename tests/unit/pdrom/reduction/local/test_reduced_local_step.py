@@ -87,7 +87,7 @@ VARIANTS = {
 
 
 @pytest.mark.parametrize("name", sorted(VARIANTS))
-def test_adds_the_lifted_reconstruction_from_sampled_elements_only(name):
+def test_the_reduced_local_step_adds_the_reconstruction_from_sampled_elements_only(name):
     """S^T W of `Reduction.reconstruct`, for projections that are not in the space.
 
     It is added to what is there, and the energy is not known.
@@ -122,7 +122,7 @@ def test_adds_the_lifted_reconstruction_from_sampled_elements_only(name):
 
 
 @pytest.mark.parametrize("preset", ["pod", "deim", "block-deim"])
-def test_the_local_kernel_adds_what_python_code_adds(preset, group_scene):
+def test_the_compiled_reduced_step_equals_the_python_code(preset, group_scene):
     """The lift is timed apart."""
     group, q = group_scene.groups[0].for_run(), group_scene.mesh.points
     group.begin_frame(q)
@@ -165,7 +165,7 @@ class Watched:
 
 
 @pytest.mark.parametrize("group", ["spring", "strain"])
-def test_basis_of_all_iterates_reruns_the_full_order_run(group):
+def test_a_basis_of_all_iterates_repeats_the_full_order_run(group):
     """Every projection is in the span, so that the orthogonal projection changes nothing."""
     scene = scene_with("spring", "strain")
     watched = Watched(scene.group(group))
@@ -199,7 +199,7 @@ def test_full_local_steps_repeat_the_run_to_the_bit():
     assert result.max_extent == extent.max()
 
 
-def test_growth_beyond_the_limit_ends_the_run_with_its_last_frame():
+def test_a_run_that_grows_beyond_the_limit_ends_with_that_frame():
     scene = scene_with("spring", frames=30)
     reference = trajectory(scene)
     push = np.linspace(-2e5, 2e5, scene.mesh.vertices)[:, None] * [1.0, 0.0, 0.0]
@@ -216,7 +216,7 @@ def test_growth_beyond_the_limit_ends_the_run_with_its_last_frame():
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e308])
-def test_numbers_that_are_none_end_the_run_before_them(bad):
+def test_a_run_that_becomes_infinite_ends_before_that_frame(bad):
     scene = scene_with("spring")
     result = rerun(scene, *steps_of(scene, [Pushing(lambda: bad)]), trajectory(scene), 2.0)
     assert result.blowup_frame == 0

@@ -45,7 +45,7 @@ def sampled(v: np.ndarray, elements: np.ndarray, size: int) -> np.ndarray:
 
 
 @given(SIZES, SEEDS, st.floats(0.0, 1e-13))
-def test_of_mirrored_entries_the_first_is_taken_whatever_round_off_says(size, seed, noise):
+def test_of_mirrored_entries_the_first_is_selected_despite_rounding_errors(size, seed, noise):
     """Both halves hold the same numbers, up to signs and a noise, as a symmetric motion's do."""
     rng = np.random.default_rng(seed)
     half = bases(size)
@@ -56,7 +56,7 @@ def test_of_mirrored_entries_the_first_is_taken_whatever_round_off_says(size, se
 
 
 @given(SIZES, st.integers(1, 4), SEEDS)
-def test_dependent_modes_get_distinct_entries_and_change_none_before(size, copies, seed):
+def test_dependent_modes_select_distinct_entries_and_keep_earlier_selections(size, copies, seed):
     """Zero modes and combinations of earlier ones, exact and rounded."""
     v = bases(size)
     rng = np.random.default_rng(seed)
@@ -84,7 +84,7 @@ def by_definition(parts: list[np.ndarray], total: int) -> list[int]:
 
 
 @given(BLOCKS)
-def test_greedy_follows_its_definition(size):
+def test_the_greedy_selection_follows_its_definition(size):
     """Of whole elements, and of rows with a system for each axis, nested in the modes."""
     v, w = blocks(size), blocks((size[0], 3, *size[2:]))
     before = v.copy(), w.copy()
@@ -146,14 +146,14 @@ def spread(kind: str, n: int = 1800, r: int = 24) -> np.ndarray:
 
 @pytest.mark.parametrize("size", [1, 3, 9])
 @pytest.mark.parametrize("kind", ["even", "few", "twelve decades", "mirrored"])
-def test_qdeim_among_candidates_is_qdeim_of_all(kind, size):
+def test_qdeim_among_candidates_selects_the_elements_of_qdeim_among_all(kind, size):
     """There are far more elements than the candidates that are looked at."""
     v = spread(kind)
     assert qdeim_elements(v, size).tolist() == qdeim_loop(v, size)
 
 
 @pytest.mark.parametrize("size", [1, 3])
-def test_qdeim_of_dependent_modes_takes_distinct_elements(size):
+def test_qdeim_of_dependent_modes_selects_distinct_elements(size):
     v = spread("even")
     elements = qdeim_elements(np.hstack([v, v[:, :2], np.zeros((len(v), 1))]), size)
     assert len(set(elements.tolist())) == v.shape[1] + 3
@@ -164,7 +164,7 @@ def test_qdeim_of_dependent_modes_takes_distinct_elements(size):
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=40)
 @given(size=SIZES)
-def test_entries_are_those_of_pymor(kind, size):
+def test_deim_and_qdeim_select_the_entries_of_pymor(kind, size):
     v = bases(size, kind)
     before = v.copy()
     theirs = pymor_deim(NumpyVectorSpace.from_numpy(v), pod=False)[0]

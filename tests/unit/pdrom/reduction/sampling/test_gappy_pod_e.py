@@ -47,13 +47,13 @@ def published_loop(u: np.ndarray, count: int) -> list[int]:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_single_rows_follow_the_published_loop(seed):
+def test_selected_rows_follow_the_published_loop(seed):
     v = modes((40, 1, 6, seed))
     assert oversample(v, 1, qdeim_elements(v, 1), 25).tolist() == published_loop(v, 25)
 
 
 @given(SIZES)
-def test_growth_is_a_lower_bound_and_exact_for_one_mode(size):
+def test_the_eigenvalue_growth_is_a_lower_bound_and_exact_for_one_mode(size):
     """Against dense eigenvalues of G + B^T B; at most |B u|^2, which r = 1 attains."""
     v = modes(size)
     blocks = v.reshape(size[0], size[1], -1)
@@ -73,7 +73,7 @@ def test_growth_is_a_lower_bound_and_exact_for_one_mode(size):
 
 @pytest.mark.parametrize("offset", [0.0, *(10.0**k for k in range(-16, 0))])
 @pytest.mark.parametrize("side", [0.0, *(10.0**k for k in range(-20, -4, 3))])
-def test_growth_next_to_a_double_root_has_all_its_digits(offset, side):
+def test_the_eigenvalue_growth_is_accurate_near_a_double_root(offset, side):
     """One row (b, sqrt(c)) and a gap near |b|^2: the exact root in 60 digits beside it."""
     gap, b = 0.37, np.sqrt(0.37) * (1.0 + offset)
     row = np.array([[[b, np.sqrt(side)]]])
@@ -86,7 +86,7 @@ def test_growth_next_to_a_double_root_has_all_its_digits(offset, side):
 
 
 @given(SIZES)
-def test_each_element_has_the_largest_bound_and_none_raises_the_gain(size):
+def test_each_element_has_the_largest_bound_and_none_raises_the_deim_constant(size):
     v = modes(size)
     before = v.copy()
     start = block_elements(v, size[1])
@@ -107,7 +107,7 @@ def test_each_element_has_the_largest_bound_and_none_raises_the_gain(size):
 
 
 @given(SIZES, st.floats(1.01, 50.0))
-def test_bounded_gain_is_met_with_no_element_too_many(size, bound):
+def test_a_bounded_deim_constant_is_reached_with_as_few_elements_as_possible(size, bound):
     """Orthonormal modes have gain 1 at all elements, so that every bound can be met."""
     v = modes(size)
     start = block_elements(v, size[1])

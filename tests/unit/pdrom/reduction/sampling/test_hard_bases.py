@@ -51,7 +51,7 @@ def basis_of(p: np.ndarray, method: str, roundoff: float | None = None):
 
 @pytest.mark.parametrize("name", SNAPSHOTS)
 @pytest.mark.parametrize("method", METHODS)
-def test_a_basis_holds_what_the_data_hold_and_reports_its_gain(name, method, rng):
+def test_a_basis_spans_its_data_and_reports_its_deim_constant(name, method, rng):
     """The numerical rank never exceeds the rank of the data, and V has no further columns.
 
     Up to the rank a gain is reported; where it is finite, so is the reconstruction. At the rank the

@@ -78,7 +78,7 @@ def span_part(reduction: Reduction, p: np.ndarray) -> np.ndarray:
 
 
 @given(seed=SEEDS, name=st.sampled_from(list(EVERY)))
-def test_reconstruction_stays_in_the_space_and_projections_reproduce_it(name, seed):
+def test_reconstructions_lie_in_the_basis_space_and_reproduce_it(name, seed):
     p, reduction = made(EVERY[name], seed)
     before = p.copy()
     result = reduction.reconstruct(p)
@@ -92,7 +92,7 @@ def test_reconstruction_stays_in_the_space_and_projections_reproduce_it(name, se
 
 
 @given(seed=SEEDS, name=st.sampled_from(list(UNWEIGHTED)))
-def test_gain_is_the_norm_of_the_pseudo_inverse_and_bounds_the_error(name, seed):
+def test_the_deim_constant_is_the_norm_of_the_pseudo_inverse_and_bounds_the_error(name, seed):
     """|| p - p^ || <= gain || (I - V V^T)(p - mean) || for data outside the training set."""
     p, reduction = made(PROJECTIONS[name], seed)
     if UNWEIGHTED[name].rows != "all":
@@ -120,7 +120,7 @@ def test_selections_and_numbers_of_rows_and_elements_are_those_of_the_presets():
         assert len(reduction.elements) == len(np.unique(reduction.elements))
 
 
-def test_round_off_axis_does_not_enter_the_joint_method():
+def test_an_axis_of_rounding_errors_does_not_enter_the_shared_row_selection():
     """A planar scene: z is round-off, its coefficients are zero and the gain is that of x, y."""
     p, mass = data(13)
     p[:, :, 2] = 1e-17 * np.random.default_rng(1).standard_normal(p.shape[:2])
@@ -132,7 +132,7 @@ def test_round_off_axis_does_not_enter_the_joint_method():
     assert not reduction.reconstruct(p)[:, :, 2].any()
 
 
-def test_singular_axis_is_a_failure_that_raises_nothing():
+def test_an_axis_with_a_singular_system_is_a_failure_without_an_exception():
     """z takes part through a mode beyond r only: at r its system is zero, but not round-off."""
     spec = PRESETS["deim-joint"]
     rng = np.random.default_rng(2)
@@ -153,7 +153,7 @@ def test_singular_axis_is_a_failure_that_raises_nothing():
 
 
 @given(name=st.sampled_from(list(EVERY)))
-def test_path_holds_the_selection_of_every_rank(name):
+def test_a_selection_path_contains_the_selection_of_every_rank(name):
     spec = EVERY[name]
     p, mass = data(19)
     basis = compute_basis(p, mass, 0.0, P, spec)
@@ -167,7 +167,7 @@ def test_path_holds_the_selection_of_every_rank(name):
             select_path(basis, spec, ranks)
 
 
-def test_reduction_from_files_is_the_same(tmp_path):
+def test_a_reduction_read_from_files_is_the_same(tmp_path):
     path, (p, own) = tmp_path / "sampling.h5", made(PRESETS["deim"], 27, 4)
     with write_hdf5(path) as file:
         file["r0004/entries"], file["r0004/elements"] = own.sampling.entries, own.elements
@@ -179,7 +179,7 @@ def test_reduction_from_files_is_the_same(tmp_path):
 
 @pytest.mark.parametrize("selection", INGREDIENTS["selection"])
 @pytest.mark.parametrize("rows", ["scalar", "element"])
-def test_oversampling_starts_from_the_selection_and_lowers_the_gain(rows, selection):
+def test_oversampling_starts_from_the_selection_and_lowers_the_deim_constant(rows, selection):
     """Single entries and elements, with three samples a mode and with a bound on the gain."""
     p, mass = data(11)
     start = MethodSpec(title="t", centring="affine", rows=rows, selection=selection, solve="qr")
@@ -211,7 +211,7 @@ def test_entries_belong_to_elements_in_order_of_need():
     assert sampling.elements.tolist() == [3, 1]
 
 
-def test_faulty_entries_are_named():
+def test_faulty_selected_entries_are_refused():
     for entries in ([], [-1], [36], [0, 36], [3, 3]):
         with pytest.raises(SamplingError):
             Sampling.of_entries(np.array(entries, dtype=int), 2, 6)
@@ -229,7 +229,7 @@ def full_rank(rows: int, columns: int, seed: int) -> np.ndarray:
 
 
 @given(st.integers(1, 12), st.integers(0, 20), SEEDS)
-def test_square_and_qr_are_the_pseudo_inverse(r, extra, seed):
+def test_square_and_qr_solves_equal_the_pseudo_inverse(r, extra, seed):
     """Square is refused where there are more equations than unknowns."""
     a = full_rank(r + extra, r, seed)
     before = a.copy()
@@ -240,7 +240,7 @@ def test_square_and_qr_are_the_pseudo_inverse(r, extra, seed):
 
 
 @given(st.integers(1, 12), st.integers(0, 20), SEEDS)
-def test_tikhonov_minimises_its_functional(r, extra, seed):
+def test_a_tikhonov_solve_minimises_its_functional(r, extra, seed):
     """c minimises |A c - b|^2 + t |c|^2: least squares of the system [A; sqrt(t) I]."""
     a, t = full_rank(r + extra, r, seed), 1e-3
     stacked = np.vstack([a, np.sqrt(t) * np.eye(r)])
@@ -258,7 +258,7 @@ SINGULAR = {
 
 
 @pytest.mark.parametrize("name", SINGULAR)
-def test_singular_systems_have_no_operator_and_infinite_gain_unless_regularised(name):
+def test_singular_systems_have_an_infinite_deim_constant_unless_regularised(name):
     """What the published code does: a finite operator of norm at most 1 / (2 sqrt(t))."""
     a = SINGULAR[name]
     for solve in ("square", "qr"):

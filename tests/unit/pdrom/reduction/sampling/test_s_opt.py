@@ -45,7 +45,7 @@ def measure(v: np.ndarray, size: int, elements, columns: int | None = None) -> f
 @pytest.mark.parametrize("kind", KINDS)
 @settings(deadline=None)
 @given(size=SIZES)
-def test_each_element_maximises_the_measure(kind, size):
+def test_each_element_maximises_the_s_opt_measure(kind, size):
     """Every step against a determinant for each element that is left."""
     v = modes(size, kind)
     before = v.copy()
@@ -64,7 +64,7 @@ def test_each_element_maximises_the_measure(kind, size):
 
 @settings(deadline=None)
 @given(SIZES)
-def test_one_element_a_mode_is_nested_and_extension_goes_on(size):
+def test_selections_of_one_element_a_mode_are_nested_and_can_be_extended(size):
     v = modes(size)
     path = s_opt_path(v, size[1])
     assert len(path) == min(size[0], size[2])
@@ -76,7 +76,7 @@ def test_one_element_a_mode_is_nested_and_extension_goes_on(size):
     np.testing.assert_array_equal(extend(v, size[1], path, 1), path)
 
 
-def test_updates_stay_accurate_over_many_steps():
+def test_rank_updates_stay_accurate_over_many_steps():
     """After 120 rank-s updates the next element is still the one that determinants give."""
     v = modes((150, 3, 60, 7), "scaled")
     picked = s_opt(v, 3, 120).tolist()
@@ -85,7 +85,7 @@ def test_updates_stay_accurate_over_many_steps():
     assert measure(v, 3, picked) == pytest.approx(best, rel=1e-9)
 
 
-def test_hard_bases_are_named(rng):
+def test_bases_without_a_selection_are_refused(rng):
     v = rng.standard_normal((30, 4))
     with pytest.raises(SamplingError, match="depend on each other at the 1 sampled"):
         extend(v, 3, np.array([0]), 6)
@@ -101,7 +101,7 @@ def test_hard_bases_are_named(rng):
     r=st.integers(2, 9),
     exponent=st.one_of(st.none(), st.floats(-18.0, -15.0), st.floats(-9.0, 0.0)),
 )
-def test_dependence_has_a_margin_on_both_sides(rows, seed, r, exponent):
+def test_modes_are_dependent_below_a_threshold_with_a_margin_on_both_sides(rows, seed, r, exponent):
     """The last mode is a combination of the others up to 10^exponent."""
     rng = np.random.default_rng(seed)
     v = np.linalg.qr(rng.standard_normal((20 * rows, r)))[0]

@@ -21,7 +21,7 @@ SETS = st.lists(
 
 
 @given(SETS)
-def test_atoms_partition_what_is_held(boundaries):
+def test_atoms_partition_the_fixed_vertices(boundaries):
     found = spaces.atoms([[*unit] for own in boundaries for unit in own], 20)
     units = [unit for boundary in boundaries for unit in boundary]
     members = np.concatenate(found) if found else np.array([], dtype=int)
@@ -38,7 +38,7 @@ def test_atoms_partition_what_is_held(boundaries):
 
 
 @given(n=st.integers(1, 12), m=st.integers(1, 12), rank=st.integers(0, 12), seed=st.integers(0, 99))
-def test_orthonormal_keeps_the_span(n, m, rank, seed):
+def test_orthonormalisation_keeps_the_span(n, m, rank, seed):
     rng = np.random.default_rng(seed)
     rank = min(rank, n, m)
     columns = rng.standard_normal((n, rank)) @ rng.standard_normal((rank, m))
@@ -66,7 +66,7 @@ def moved():
 
 @pytest.mark.parametrize("kind", ["pod", "skinning"])
 @pytest.mark.parametrize("k", [3, 8])
-def test_columns_are_mass_orthonormal_apart_for_atoms_and_hold_affine_motions(moved, kind, k, rng):
+def test_columns_are_mass_orthonormal_separate_for_atoms_and_span_affine_maps(moved, kind, k, rng):
     """Coordinates are the best in the mass norm."""
     scene, run = moved
     masses, points = scene.masses, scene.mesh.points
@@ -97,7 +97,7 @@ def test_columns_are_mass_orthonormal_apart_for_atoms_and_hold_affine_motions(mo
     np.testing.assert_allclose(columns.B.T @ (masses[:, None] * left), 0.0, atol=1e-11)
 
 
-def test_displacement_modes_are_the_mass_weighted_pod_and_no_more_than_the_data_hold(moved):
+def test_displacement_modes_are_the_mass_weighted_pod_up_to_the_rank_of_the_data(moved):
     """Against a dense SVD of the snapshots that have lost their affine part."""
     scene, run = moved
     points, masses = scene.mesh.points, scene.masses

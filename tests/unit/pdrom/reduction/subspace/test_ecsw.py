@@ -34,7 +34,7 @@ def random_columns(scene, rng, k=5):
 @pytest.mark.parametrize("name", SCENES)
 @settings(max_examples=12, deadline=None)
 @given(seed=st.integers(0, 2**31), spread=st.floats(-2, 1.5))
-def test_objective_never_rises_whatever_the_factors(name, seed, spread):
+def test_the_objective_never_rises_for_any_factors(name, seed, spread):
     scene, rng = SCENES[name], np.random.default_rng(seed)
     columns = random_columns(scene, rng)
     group = scene.groups[0]
@@ -67,7 +67,7 @@ def pulled():
     return scene, run, make_columns([scene], run[1:], 4)
 
 
-def test_sampled_equations_meet_the_tolerance(pulled):
+def test_the_sampled_equations_satisfy_the_tolerance(pulled):
     scene, _, columns = pulled
     training = ecsw.training_run(scene, columns, np.arange(0, 12, 3))
     for group in scene.groups:
@@ -106,7 +106,7 @@ def exact_forces(group, columns, training) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("number", "tolerance"), [(1, 3e-2), (0, 1e-2)], ids=["half", "three"])
-def test_a_part_of_a_group_stands_for_all_and_grows_where_it_misses(
+def test_candidates_are_part_of_the_group_and_grow_if_they_miss_the_tolerance(
     pulled, monkeypatch, number, tolerance
 ):
     """Half of the candidates of one group, three of the other, which are too few."""
@@ -124,7 +124,7 @@ def test_a_part_of_a_group_stands_for_all_and_grows_where_it_misses(
     assert np.linalg.norm(left) <= tolerance * np.linalg.norm(total) * (1.0 if number else 1.01)
 
 
-def test_factors_of_one_repeat_the_iterations(pulled):
+def test_all_elements_with_factors_of_one_satisfy_the_training_equations(pulled):
     """What is trained on is an identity: all equations hold for the iterates of the run."""
     scene, _, columns = pulled
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
@@ -150,7 +150,7 @@ def test_factors_of_one_repeat_the_iterations(pulled):
     assert not frame.measure[:, fixed].any()
 
 
-def test_training_equations_are_those_of_the_elements(rng):
+def test_training_equations_follow_their_definition_element_by_element(rng):
     """Element by element from the definition; hashing adds each equation to one row, signed."""
     scene = SCENES["strain"]
     group, columns = copy(scene.groups[0]), random_columns(scene, rng, 3)
@@ -178,7 +178,7 @@ def test_training_equations_are_those_of_the_elements(rng):
     )
 
 
-def test_a_group_at_rest_keeps_its_stiffness(pulled):
+def test_a_group_without_force_in_training_keeps_all_elements(pulled):
     """No force at all in the training states: there is nothing to fit, so all elements stay."""
     scene, _, columns = pulled
     rest = coordinates(columns, scene.masses, scene.mesh.points)
@@ -212,7 +212,7 @@ def dense(support, values, size) -> np.ndarray:
 @given(
     m=st.integers(1, 25), e=st.integers(1, 25), seed=st.integers(0, 2**31), scale=st.floats(-6, 6)
 )
-def test_without_tolerance_it_is_the_method_of_lawson_and_hanson(m, e, seed, scale):
+def test_least_squares_without_tolerance_follow_lawson_and_hanson(m, e, seed, scale):
     rng = np.random.default_rng(seed)
     g = 10.0**scale * rng.standard_normal((m, e)) * 10.0 ** rng.uniform(-2, 2, e)
     b = rng.standard_normal(m)
@@ -228,7 +228,7 @@ def test_without_tolerance_it_is_the_method_of_lawson_and_hanson(m, e, seed, sca
     np.testing.assert_allclose(g @ x, g @ best, atol=1e-5 * np.linalg.norm(b))
 
 
-def test_blocks_of_columns_end_at_the_same_minimum(rng):
+def test_least_squares_by_blocks_of_columns_reach_the_same_minimum(rng):
     """Large enough that several columns join at a time and that columns leave."""
     g = rng.standard_normal((150, 400)) + 0.2 * rng.standard_normal((150, 1))
     b = g[:, :80].sum(axis=1) + 10.0 * rng.standard_normal(150)
@@ -239,7 +239,7 @@ def test_blocks_of_columns_end_at_the_same_minimum(rng):
     np.testing.assert_allclose(dense(support, values, 400), best, atol=1e-6)
 
 
-def test_a_path_meets_each_of_its_tolerances_with_few_columns():
+def test_each_tolerance_of_a_path_is_satisfied_with_few_columns():
     """Sum of many smooth columns: far fewer of them suffice."""
     g, b = SMOOTH, SMOOTH.sum(axis=1)
     tolerances = [1e-3, 0.5, 0.1, 1e-2, 1e-5]
@@ -266,6 +266,6 @@ def test_a_path_meets_each_of_its_tolerances_with_few_columns():
         (np.column_stack([np.zeros(2), [2.0, 0.0]]), np.array([4.0, 0.0]), {1: 2.0}),
     ],
 )
-def test_known_solutions(g, b, expected):
+def test_least_squares_have_the_known_solutions(g, b, expected):
     support, values = stopped(g, b, 0.0)
     assert dict(zip(support.tolist(), values.tolist(), strict=True)) == pytest.approx(expected)

@@ -26,9 +26,7 @@ from pdrom.reduction.subspace.space import coordinates
 from pdrom.reduction.subspace.training import make_columns
 
 
-def test_space_is_orthonormal_starts_with_the_rest_vectors_and_fits_by_least_squares(
-    group_scene, rng
-):
+def test_the_space_is_orthonormal_starts_with_rest_vectors_and_fits_least_squares(group_scene, rng):
     """In the weights of the elements; a space for which samples are too few is a named error.
 
     Centres of elements, by which they are chosen, are the means of their vertices.
@@ -75,7 +73,7 @@ def test_blended_linear_maps_are_reproduced_exactly(name, seed, handles):
     np.testing.assert_allclose(again, field, atol=1e-7 * np.abs(field).max())
 
 
-def test_hrpd_is_exact_with_everything_and_for_a_turned_rest_shape(group_scene, rng):
+def test_hrpd_is_exact_with_all_elements_and_for_a_rotated_rest_shape(group_scene, rng):
     """One linear map for all elements is in the space, whatever its dimension and samples."""
     scene, group, rest = group_scene, group_scene.groups[0], group_scene.mesh.points
     size = group.elements * group.rows_per_element
@@ -100,7 +98,7 @@ def test_hrpd_is_exact_with_everything_and_for_a_turned_rest_shape(group_scene, 
         np.testing.assert_allclose(*sums, atol=1e-8 * np.abs(sums[1]).max())
 
 
-def test_projections_that_are_round_off_need_no_element():
+def test_projections_of_rounding_errors_need_no_element():
     """A flat sheet has nothing to bend: no mode, no sample, and the same run as with all."""
     scene = make_scene({"effect": "bending", "weight": 10.0}, SPRING, GRAVITY, TOP, frames=5)
     reference = trajectory(scene)

@@ -87,7 +87,7 @@ def test_the_whole_space_repeats_the_full_order_run(name):
 @pytest.mark.parametrize("made", [lambda *_: {}, hrpd_of], ids=["all", "hrpd"])
 @pytest.mark.parametrize("kind", ["pod", "skinning"])
 @pytest.mark.parametrize("name", ["pins", "handles", "released", "poke", "bar"])
-def test_pins_and_handles_are_met_exactly(name, kind, made):
+def test_fixed_vertices_have_their_prescribed_positions_exactly(name, kind, made):
     scene = SCENES[name]()
     reference = trajectory(scene)
     columns = training.make_columns([scene], reference[1:], **{kind: 3})
@@ -111,14 +111,14 @@ def test_pins_and_handles_are_met_exactly(name, kind, made):
 
 
 @pytest.mark.parametrize(("vertices", "columns"), [(3, 1), (512, 4), (1300, 7)])
-def test_output_in_single_precision_is_the_product(vertices, columns):
+def test_positions_in_single_precision_are_columns_times_coordinates(vertices, columns):
     """Sizes below, at and above those of the panels."""
     rng = np.random.default_rng(1)
     B, z = rng.standard_normal((vertices, columns)), rng.standard_normal((columns, 3))
     np.testing.assert_allclose(models.Output(B)(z), B @ z, rtol=0.0, atol=1e-5)
 
 
-def test_restricted_group_is_the_full_group_on_its_elements(group_scene, rng):
+def test_a_restricted_group_equals_the_full_group_on_its_elements(group_scene, rng):
     """Projections, energy and right-hand side, also from frozen data of a frame; it stays apart."""
     group, points = group_scene.groups[0].for_run(), group_scene.mesh.points
     elements = np.sort(rng.permutation(group.elements)[: group.elements // 3])
@@ -144,7 +144,7 @@ def test_restricted_group_is_the_full_group_on_its_elements(group_scene, rng):
 
 @pytest.mark.parametrize("made", [ecsw_of, hrpd_of])
 @pytest.mark.parametrize("name", ["handles", "bending", "bar", "poke", "damped"])
-def test_a_step_reads_nothing_of_the_mesh(name, made):
+def test_a_reduced_step_reads_no_array_of_the_length_of_the_mesh(name, made):
     """With everything of the length of the mesh overwritten a second run is the same."""
     scene = SCENES[name]()
     columns = training.make_columns([scene], trajectory(scene)[1:], 3)
@@ -171,7 +171,7 @@ def test_a_step_reads_nothing_of_the_mesh(name, made):
 @pytest.mark.parametrize(
     "name", ["free", "handles", "released", "poke", "damped", "dragged", "bending", "bar"]
 )
-def test_fused_iterations_are_the_plain_ones(name):
+def test_iterations_in_compiled_code_equal_those_of_the_step_loop(name):
     """The compiled loop against the step loop with projections and solve one after the other."""
     scene = SCENES[name]()
     reference = trajectory(scene)
@@ -243,7 +243,7 @@ def test_forces_that_cannot_be_reduced_are_refused():
         ReducedSpace(scene, columns, [np.eye(columns.B.shape[1])])
 
 
-def test_models_survive_a_file(tmp_path):
+def test_models_are_read_as_they_were_written(tmp_path):
     """The layout of rule subspaces."""
     scene = SCENES["handles"]()
     reference = trajectory(scene)

@@ -41,7 +41,7 @@ def test_many_iterations_end_at_the_implicit_step(group, rng):
 
 
 @pytest.mark.parametrize("group", GROUPS)
-def test_two_iterations_that_are_not_extrapolated_are_the_step_loop(group, rng):
+def test_two_iterations_without_extrapolation_equal_the_step_loop(group, rng):
     scene = small(group, *HELD, iterations=2)
     loop = Chebyshev(scene, 2)
     loop.rate = 0.0
@@ -49,7 +49,7 @@ def test_two_iterations_that_are_not_extrapolated_are_the_step_loop(group, rng):
 
 
 @pytest.mark.parametrize("weight", [1e3, 1e6])
-def test_the_rate_is_that_at_which_plain_iterations_approach_their_limit(weight):
+def test_the_rate_is_the_convergence_rate_of_the_plain_iterations(weight):
     scene = small("spring", *HELD, weight=weight)
     best = ConvergedStepper(scene, scene.system, 1e-13, 4000)
     start = scene.initial_state()
@@ -85,7 +85,7 @@ def model_of(scene, modes: int, elements: np.ndarray | None = None) -> SubspaceM
 
 @pytest.mark.parametrize("group", ["spring", "strain", "tetrahedron_strain"])
 @pytest.mark.parametrize("every", [1, 7])
-def test_whatever_is_sampled_many_iterations_end_at_the_implicit_step(group, every, rng):
+def test_many_iterations_end_at_the_implicit_step_for_any_sampled_elements(group, every, rng):
     scene = small(group, *HELD, frames=8)
     model = model_of(scene, 3, np.arange(0, scene.groups[0].elements, every))
     best = ConvergedStepper(scene, scene.system, 1e-12, 4000)

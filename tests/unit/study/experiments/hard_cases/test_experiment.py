@@ -45,13 +45,13 @@ def test_a_failure_is_listed_with_its_reason(tmp_path):
         ("x: {why: short, fails: [torn]}", "why = 'short'"),
     ],
 )  # fmt: skip
-def test_a_faulty_entry_is_named(text, message):
+def test_a_faulty_entry_of_the_hard_cases_is_named(text, message):
     config = {"expected": yaml.safe_load(text)}
     with pytest.raises(ConfigurationError, match=rf"^a\.yaml: .*{message}"):
         validate(module.HardCases, config, "a.yaml")
 
 
-def test_every_method_takes_part_not_only_those_of_the_study():
+def test_every_method_is_run_on_the_hard_cases_not_only_those_of_the_study():
     study = Study(read_yaml(ROOT / "config" / "tiny.yaml"), ROOT)
     asked = Plan(study).job(module.hard_cases, {}).settings["every_method"]
     assert set(asked) == set(read_yaml(ROOT / "config" / "methods.yaml"))

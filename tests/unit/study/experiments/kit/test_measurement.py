@@ -11,7 +11,7 @@ MOVING = (GRAVITY, {"effect": "floor"}, LEFT, {"effect": "pins", "select": "righ
 EFFECTS = (*MOVING, {"effect": "spring", "weight": 1e5}, {"effect": "strain", "weight": 1e4})
 
 
-def test_every_effect_has_a_row_and_the_shares_are_whole():
+def test_every_effect_has_a_row_and_the_shares_add_up_to_one():
     scene = make_scene(*EFFECTS)
     table = module.effect_costs(scene, 3, 1, 3)
     assert list(table.columns) == module.COSTS
@@ -24,7 +24,7 @@ def test_every_effect_has_a_row_and_the_shares_are_whole():
     assert table.share.sum() == pytest.approx(1.0)
 
 
-def test_a_stand_in_and_its_kernel_answer_as_the_effect_does(rng):
+def test_a_timed_effect_and_its_kernel_return_the_values_of_the_effect(rng):
     """Timed effects stay in the compiled loop, so that their times are those of a run."""
     scene = make_scene(*EFFECTS)
     group = scene.group("strain")
@@ -46,7 +46,7 @@ def test_a_stand_in_and_its_kernel_answer_as_the_effect_does(rng):
     assert space.compiled([module.Timed(g, ("begin_frame",)) for g in scene.groups])[0] is not None
 
 
-def test_effects_of_a_frame_are_left_out_alone_and_groups_together():
+def test_effects_are_omitted_one_at_a_time_and_groups_together():
     # a kick is over before the first frame
     bending = {"effect": "bending", "weight": 1.0}
     scene = make_scene({"effect": "kick", "speed": 0.1, "seed": 1}, *EFFECTS, bending)

@@ -32,5 +32,5 @@ def test_schedules_keep_their_seconds_and_only_the_reduced_weight_changes():
         (["full"], 0, []),
     ],
 )
-def test_sizes_ascend_and_full_is_the_rank(asked, rank, sizes):
+def test_basis_sizes_ascend_and_full_is_the_rank(asked, rank, sizes):
     assert resolve_ranks(asked, rank) == sizes

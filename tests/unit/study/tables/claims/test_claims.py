@@ -143,7 +143,7 @@ def measured(metric: str, accuracy: float = 0.1, **where) -> list[float]:
         ("position_basis_ratio", {"scene": "b", "accuracy": 0.01}, []),
     ],
 )
-def test_metrics_by_hand(metric, where, expected):
+def test_a_metric_has_the_value_by_hand(metric, where, expected):
     assert measured(metric, **where) == pytest.approx(expected)
 
 
@@ -164,7 +164,7 @@ def test_the_trend_of_all_experiments_together(monkeypatch):
 
 
 @pytest.mark.parametrize("metric", ["rerun_error", "error_trend"])
-def test_runs_with_reduced_positions_count_only_if_asked_for(metric, monkeypatch):
+def test_runs_with_reduced_positions_count_only_if_a_rule_names_them(metric, monkeypatch):
     """A method of the same name in a subspace does not change the verdict on unreduced runs."""
     before = measured(metric, method="deim")
     both = [("b", "all", "deim", "pod", 8, r, 10, None, 0.25 * r, 7.0) for r in (50, 100, 200)]
@@ -196,7 +196,7 @@ COMPILED = {"where": {"implementation": ["compiled"]}}  # shares 0.75 and 0.5: r
         ("<=", 0.4, 0.75, 1.51, MACHINE),
     ],
 )
-def test_a_share_of_rows_must_agree_and_ratios_near_the_limit_decide_nothing(
+def test_a_share_of_rows_must_agree_and_ratios_near_the_limit_are_inconclusive(
     compare, threshold, share, margin, expected
 ):
     test = rule("local_share", compare, threshold, share=share, margin=margin, **COMPILED)
@@ -205,7 +205,7 @@ def test_a_share_of_rows_must_agree_and_ratios_near_the_limit_decide_nothing(
 
 
 @given(st.lists(st.floats(0.01, 100.0), min_size=1, max_size=20), st.data())
-def test_no_machine_refutes_what_holds_on_one_twice_as_fast(ratios, data):
+def test_a_claim_about_times_is_not_reversed_on_a_machine_twice_as_fast(ratios, data):
     """Ratios that move by less than the margin squared do not cross both of its ends."""
     test = rule("solve_time_ratio", ">=", 1.0)
     moves = data.draw(arrays(float, len(ratios), elements=st.floats(0.45, 2.2)))
@@ -213,7 +213,7 @@ def test_no_machine_refutes_what_holds_on_one_twice_as_fast(ratios, data):
     assert answers != {HOLDS, FAILS}
 
 
-def test_runs_that_are_not_accurate_are_no_times():
+def test_the_speedup_of_an_inaccurate_run_counts_as_zero():
     """Their speed-up counts as 0, clearly below any limit."""
     test = rule("useful_speedup", "<=", 1.0)
     for third, expected in ((0.0, HOLDS), (1.1, MACHINE)):
@@ -266,7 +266,7 @@ FALSE = {"threshold": 0.99}
         ([ABSENT, {"decides": False}], UNDECIDED),
     ],
 )
-def test_every_verdict(tmp_path, tests, expected):
+def test_a_claim_gets_the_expected_verdict(tmp_path, tests, expected):
     row = verdict(tmp_path, *tests)
     assert row.verdict == expected
     assert (row.verdict_both, row.verdict_beyond_both) == (expected, HOLDS)  # not of reruns
@@ -276,7 +276,7 @@ def test_every_verdict(tmp_path, tests, expected):
     assert row.measured.count(";") == sum(t.get("decides", True) for t in tests) - 1
 
 
-def test_verdicts_by_both_errors_are_those_of_the_larger_one(tmp_path):
+def test_verdicts_by_two_errors_use_the_larger_error(tmp_path):
     """Thrice the position error, .1, or none where the reference moves rigidly."""
     test = {"metric": "useful_speedup", "where": {"scene": ["a"], "r": [6]}, "accuracy": 0.1}
     for accuracy, both in ((0.4, HOLDS), (0.1, FAILS)):
@@ -306,7 +306,7 @@ def test_faulty_rules_name_file_claim_and_key(tmp_path, fault, message):
         verdict(tmp_path, fault)
 
 
-def test_a_set_stands_for_its_values_and_those_that_a_study_adds(tmp_path):
+def test_a_set_of_scenes_contains_its_values_and_those_that_a_study_adds(tmp_path):
     path = tmp_path / "claims.yaml"
     where = {"scene": ["@ends", "b"], "implementation": ["compiled"]}
     content = {"sets": {"ends": ["a", "z"]}, "C1": claim({"where": where})}
@@ -320,7 +320,7 @@ def test_a_set_stands_for_its_values_and_those_that_a_study_adds(tmp_path):
         load_claims(path, {"end": ("z",)})
 
 
-def test_changes_are_in_their_order(tmp_path):
+def test_changes_of_a_claim_must_be_in_order_of_date(tmp_path):
     path, change = tmp_path / "claims.yaml", claim({})["changes"][0]
     later = change | {"date": "2026-02-01", "after_data": True}
     path.write_text(yaml.safe_dump({"C1": claim({}) | {"changes": [later, change]}}))
@@ -355,7 +355,7 @@ def test_a_fingerprint_changes_with_every_rule_but_not_with_its_words():
     assert len({same, *(fingerprint(**other) for other in others)}) == 1 + len(others)
 
 
-def test_without_data_nothing_is_decided():
+def test_claims_without_data_are_undecided():
     """Every rule names columns that exist, and none passes for lack of rows."""
     empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
     rows = claims(PATH, {}, **empty)
@@ -365,7 +365,7 @@ def test_without_data_nothing_is_decided():
     assert (rows.verdict_beyond == untested.map({True: UNTESTED, False: UNDECIDED})).all()
 
 
-def test_held_out_motions_decide_by_their_median():
+def test_test_trajectories_are_judged_by_their_median():
     where = {"position_basis": ["full"]}
     names = ("rerun_error", "heldout_rerun_error")
     own, unseen = (verdicts.values_of(rule(name, where=where), tables()) for name in names)
@@ -409,7 +409,7 @@ def test_only_claims_about_times_are_timed():
 
 
 @pytest.mark.parametrize("made", [claims, claims_tests, claims_sensitivity, verdicts.replication])
-def test_a_clock_has_its_say_where_times_are_compared_only(made):
+def test_only_verdicts_that_compare_times_depend_on_the_clock(made):
     names = ["C2", "C9"]
     whats = [RULES[name].published[0].what for name in names]
     rows = pd.DataFrame({"claim": names, "part": "published", "what": whats})
@@ -453,7 +453,7 @@ def made(path, **rule) -> pd.DataFrame:
         ({"where": {"split": ["test", "train"]}}, "splits", {"train": DEPENDS}),
     ],
 )  # fmt: skip
-def test_verdicts_under_other_rules(tmp_path, changes, varied, expected):
+def test_a_verdict_is_as_expected_under_other_rules(tmp_path, changes, varied, expected):
     rows = made(tmp_path / "claims.yaml", **changes)
     chosen = rows[rows.varied == varied]
     assert dict(zip(chosen.variation, chosen.verdict, strict=True)) == expected
@@ -462,7 +462,7 @@ def test_verdicts_under_other_rules(tmp_path, changes, varied, expected):
     assert (rows.same == (rows.verdict == unchanged)).all()
 
 
-def test_every_test_says_what_it_found_and_those_that_decide_give_the_by_variation():
+def test_every_test_of_a_claim_reports_its_values_and_the_deciding_ones_the_verdict():
     tables = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
     assert claims_sensitivity(PATH, {}, **tables).empty
     shares = frame("scene local_share", ("a", 0.2), ("b", 0.8), ("c", 0.9))

@@ -38,7 +38,7 @@ CELLS = {
 
 
 @given(st.lists(st.fixed_dictionaries(CELLS), min_size=1, max_size=6))
-def test_whatever_is_empty_the_types_are_the_declared_ones(rows):
+def test_columns_have_the_declared_types_even_if_they_are_empty(rows):
     made = invented(rows)
     assert tuple(made.columns) == invented.column_names
     types = {"count": "Int64", "size": "float64", "good": "boolean"}
@@ -48,13 +48,13 @@ def test_whatever_is_empty_the_types_are_the_declared_ones(rows):
 
 
 @pytest.mark.parametrize("content", [pd.DataFrame(), pd.DataFrame(columns=["name"])])
-def test_a_table_without_rows_has_its_columns_in_a_file_too(content, tmp_path):
+def test_the_file_of_a_table_without_rows_has_its_columns(content, tmp_path):
     write_table(invented.checked(content), tmp_path / "t.csv")
     assert tuple(read_table(tmp_path / "t.csv").columns) == invented.column_names
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0), (0, 1, 2)])
-def test_flags_survive_a_part_without_any(order):
+def test_a_column_of_flags_keeps_its_type_if_a_part_has_none(order):
     """A file in which nothing ran has a column of empty numbers."""
     cells = pd.Series([True]), pd.Series([np.nan]), pd.Series([1.0])
     rows = pd.DataFrame([ROW] * len(order)).drop(columns="good")
@@ -63,7 +63,7 @@ def test_flags_survive_a_part_without_any(order):
     assert good.dropna().all()
 
 
-def test_columns_are_put_in_order_and_numbers_written_alike_whatever_they_came_as(tmp_path):
+def test_columns_are_in_declared_order_and_numbers_are_written_alike(tmp_path):
     """A column of objects would be written with all digits."""
     row = {name: ROW[name] for name in reversed(ROW)} | {"size": 1.0 / 3.0, "more": 1}
     made = invented.checked(pd.DataFrame([row], index=[5]).astype({"size": object}))
@@ -83,7 +83,7 @@ def test_columns_are_put_in_order_and_numbers_written_alike_whatever_they_came_a
         ({"name": "a", "size": 1.0, "seconds": 2.0}, "invented: .* count, good"),
     ],
 )
-def test_what_does_not_fit_is_named_with_its_column(row, message):
+def test_a_value_of_a_wrong_type_is_named_with_its_column(row, message):
     with pytest.raises(StorageError, match=message):
         invented([row])
 
@@ -104,7 +104,7 @@ def test_a_faulty_declaration_is_refused(columns, reads, message):
             """Nothing."""
 
 
-def test_every_column_says_what_it_is_and_a_measured_time_is_timed():
+def test_every_column_has_a_description_and_measured_times_are_marked_as_timed():
     for name, made in declared().items():
         assert made.title
         for column in made.columns:
