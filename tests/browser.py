@@ -18,7 +18,7 @@ OPTIONS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
-LIMIT = 120_000  # ms after which a page that does not answer has failed
+LIMIT = 120_000  # milliseconds after which a page without an answer has failed
 
 
 def browser_or_skip() -> str:
@@ -46,7 +46,7 @@ def page_at(address: str, width: int, height: int) -> Iterator[Page]:
 
 
 def picture(element: Locator) -> np.ndarray:
-    """What is seen of an element, (height, width, 3)."""
+    """Pixels of an element on the screen, (height, width, 3)."""
     drawn = "new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))"
     element.page.evaluate(drawn)
     with Image.open(io.BytesIO(element.screenshot())) as image:

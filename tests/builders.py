@@ -29,7 +29,7 @@ OBSTACLES = {
 GRAVITY = {"effect": "gravity"}
 LEFT = {"effect": "pins", "select": "left"}
 TOP = {"effect": "pins", "select": "top"}
-# File of a small sheet, for commands.
+# Scene file of a small sheet, for commands.
 SMALL = """\
 name: small
 title: Small
@@ -57,12 +57,12 @@ def with_effects(scene: Scene, *effects: dict) -> Scene:
 
 
 def frame(header: str, *rows: tuple) -> pd.DataFrame:
-    """Rows under the columns that a header names."""
+    """Data frame of the rows, with the columns that a header names."""
     return pd.DataFrame(list(rows), columns=header.split())
 
 
 def write_result(path: Path, value: float = 0.1) -> None:
-    """A small result of the kind that its name says, which holds the value."""
+    """Write a small result that contains the value, in the format of its file name."""
     if path.suffix == ".h5":
         with store.write_hdf5(path) as file:
             file["x"] = np.linspace(0.0, value, 64)
@@ -82,13 +82,13 @@ def random_rotation(rng: np.random.Generator) -> np.ndarray:
 
 
 class Pushing:
-    """A local step that adds what ``draw`` gives in each call: (N, 3) N, or a number."""
+    """A local step that adds the value of ``draw`` in each call: (N, 3) N, or a number."""
 
     def __init__(self, draw, name: str = "spring") -> None:
         self.draw, self.name = draw, name
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Nothing is frozen."""
+        """Freeze nothing."""
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         rhs += self.draw()
@@ -97,7 +97,7 @@ class Pushing:
 
 @njit
 def call_kernel(address, d, parameters, p, m):
-    """Call the compiled kernel at ``address`` for ``m`` elements; p is written."""
+    """Call the compiled kernel at ``address`` for ``m`` elements, which writes into p."""
     call_gradients(address, d.ctypes.data, parameters.ctypes.data, p.ctypes.data, m)
 
 
@@ -109,7 +109,7 @@ def depths(contact, points: np.ndarray) -> np.ndarray:
 def simplices(rows: int, count: int) -> Mesh:
     """``count`` separate unit simplices with ``rows`` + 1 vertices.
 
-    Their S q is F^T, so that F is chosen freely.
+    Their S q is F^T, so that a test can choose F freely.
     """
     corners = np.eye(4, 3, k=-1)[: rows + 1]
     cells = np.arange(count * (rows + 1), dtype=np.int32).reshape(count, rows + 1)
@@ -131,7 +131,7 @@ def projected(group, f: np.ndarray) -> np.ndarray:
 
 
 def perturbed_runs() -> pd.DataFrame:
-    """Differences of perturbed runs: scene a exceeds 1e-3 in frame 2 (held out: 1), b never."""
+    """Differences of perturbed runs: scene a exceeds 1e-3 in frame 2 (test run: 1), b never."""
     values = {
         ("a", "1e-10", 1): [0.0, 1e-9, 5e-3, 1e-9],
         ("a", "1e-10", 2): [0.0, 2e-9, 1e-9, 1.0],

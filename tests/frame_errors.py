@@ -1,4 +1,4 @@
-"""Scenes with weights from soft to far too stiff; how often their frame errors are right."""
+"""Compare estimated frame errors with errors against a minimiser, on soft to very stiff scenes."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ def scene_of(kind, weight, iterations=10, window=0, frames=60):
 
 
 def share(*scenes):
-    """Share of estimates within a factor of three of errors against a minimiser (above 1e-6)."""
+    """Share of estimates within a factor of three of the error against a minimiser (above 1e-6)."""
     found = []
     for scene in scenes:
         loop, state, extent = scene.stepper(estimate=True), scene.initial_state(), scene.mesh.extent

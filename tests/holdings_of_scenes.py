@@ -1,7 +1,7 @@
-"""What a scene without an effect imports, compiles and holds.
+"""Report the imports, compiled functions and memory of a scene that does not list an effect.
 
-Run as a program with the name of a constraint group and those of effects, it reports that of a
-scene of this group alone, before the effects' code was loaded and after each of them was.
+The program gets the name of a constraint group and those of effects. It describes a scene of this
+group before the code of the effects was loaded and after each of them was.
 """
 
 import json
@@ -18,14 +18,14 @@ FRAMES = 2
 
 
 def arrays(thing: object, seen: set[int] | None = None) -> dict[int, np.ndarray]:
-    """Every array that is reached from ``thing``, by identity."""
+    """Every array that ``thing`` refers to, by identity."""
     seen = set() if seen is None else seen
     if id(thing) in seen:
         return {}
     seen.add(id(thing))
     if isinstance(thing, np.ndarray):
         return {id(thing): thing}
-    # code is counted by `compiled`, and what a compiler holds is not the scene's
+    # `compiled` counts code, and arrays of the compiler do not belong to the scene
     if isinstance(thing, (str, bytes, int, float, type, Callback)):
         return {}
     parts = list(thing.values()) if isinstance(thing, Mapping) else []
@@ -49,7 +49,7 @@ def compiled() -> dict[str, int]:
 
 
 def state_of(group: str) -> dict:
-    """What a scene with one constraint group holds, and what its run gives."""
+    """Memory and positions of a run of a scene with one constraint group."""
     from builders import make_scene
     from pdrom.model.runs import trajectory
 
@@ -65,7 +65,7 @@ def state_of(group: str) -> dict:
 
 
 def report(group: str, effects: list[str]) -> dict[str, object]:
-    """A scene of ``group`` alone, before anything else was loaded and after each effect was."""
+    """Describe a scene of ``group`` before any effect was loaded and after each effect was."""
     from pdrom.model.effects import EFFECTS
 
     found: dict[str, object] = {"alone": state_of(group)}

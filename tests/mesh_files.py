@@ -12,13 +12,13 @@ from pdrom.model.mesh import reader
 from pdrom.model.mesh.generators import bar, cloth
 from pdrom.model.mesh.types import Mesh
 
-# Formats that hold tetahedra, and names of meshio's writers that are not the extension.
+# Formats of tetrahedra, and names of meshio's writers that differ from the extension.
 VOLUMES = (".msh", ".mesh", ".vtk", ".vtu")
 WRITERS = {".msh": "gmsh", ".mesh": "medit"}
 
 
 def write_mesh(path: Path, kind: str = "triangle", writer: str = "", **more: object) -> Mesh:
-    """Write a small mesh of this kind of cells, whose vertices are scrambled, and return it."""
+    """Write a small mesh with cells of this kind and scrambled vertices, and return it."""
     mesh = bar(3, 2, 2) if kind == "tetra" else cloth(4, 3, wave=0.25)
     order = np.random.default_rng(2).permutation(mesh.vertices)
     points = np.empty_like(mesh.points)
@@ -36,7 +36,7 @@ def read_here(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def refusal(path: Path) -> str:
-    """Why the file is refused, on one line; nothing if it is read."""
+    """Reason of the refusal on one line, empty if the file is read."""
     said = ""
     try:
         read_here(path)

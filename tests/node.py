@@ -1,4 +1,4 @@
-"""Scripts of the page without a browser: by the Node.js that Playwright's wheel brings."""
+"""Run scripts of the page without a browser, with the Node.js of Playwright's wheel."""
 
 import json
 import subprocess
@@ -10,7 +10,7 @@ from playwright._impl._driver import compute_driver_executable
 from places import ROOT
 
 SCRIPTS = [ROOT / "src/pdrom/view/packed.js", ROOT / "src/pdrom/view/engine.js"]
-# Unpacks the file of models, then evaluates the script with what was given.
+# Unpacks the file of models, then evaluates the script with the given values.
 MAIN = """
 const { readFileSync } = require("fs");
 const given = JSON.parse(readFileSync(0, "utf8"));
@@ -41,7 +41,7 @@ return all;
 
 
 def evaluate(script: str, file: Path | None = None, **given: Any) -> Any:
-    """Value that a script returns, with the engine, the unpacked models and what is given."""
+    """Return the value of a script that sees the engine, the unpacked models and the given values."""
     node = compute_driver_executable()[0]
     scripts = [str(path) for path in SCRIPTS]
     data = {"scripts": scripts, "file": file and str(file), "script": script, **given}

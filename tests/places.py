@@ -1,4 +1,4 @@
-"""Where the project lies, for tests that read its configuration or its code."""
+"""Folders of the project, for tests that read its configuration or its code."""
 
 import subprocess
 from pathlib import Path
@@ -9,13 +9,13 @@ ROOT = Path(__file__).resolve().parents[1]
 CONFIG = ROOT / "config"
 EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
 
-# Where the results of the small study of the workflow's tests lie, and its manuscript.
+# Folders of the results and the manuscript of the small study of the workflow's tests.
 MICRO_RESULTS = "results/studies/micro"
 MICRO_MANUSCRIPT = f"{MICRO_RESULTS}/paper/main.pdf"
 
 
 def tracked(*options: str) -> list[Path]:
-    """Files that git lists, of the index without options; the test is left out where it cannot."""
+    """Files that git lists (without options: the index); the test is skipped without git."""
     listed = subprocess.run(
         ["git", "ls-files", "-z", *options], cwd=ROOT, capture_output=True, check=False
     )

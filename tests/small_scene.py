@@ -21,7 +21,7 @@ CHANGES = {
 
 
 def small_study(root: Path) -> Study:
-    """Study of the small project, with a scene beside those that it lists."""
+    """Study of the small project, with a scene in addition to those that it lists."""
     make_project(root, {})
     own = SMALL_SCENE.replace("name: small", f"name: {SCENE}")
     (root / "config" / "scenes" / f"{SCENE}.yaml").write_text(own, encoding="utf-8")
@@ -30,7 +30,7 @@ def small_study(root: Path) -> Study:
 
 
 def run_jobs(study: Study, results: str, names: Iterable[str], scene: str) -> None:
-    """Every job of these experiments for a scene, in this process, as the workflow runs them."""
+    """Run every job of these experiments for a scene, in this process, as the workflow does."""
     plan = Plan(study, Folders(results))
     for name in names:
         made = experiments()[name]

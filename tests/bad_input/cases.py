@@ -1,4 +1,4 @@
-"""The corpus of broken input: what is broken, how it is fed in, and what the message must say."""
+"""The corpus of broken inputs and the parts that each error message must contain."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,11 +12,11 @@ METHODS, CLAIMS = (f"config/{name}.yaml" for name in ("methods", "claims"))
 
 @dataclass(frozen=True)
 class Case:
-    """One fault.
+    """Describe one fault.
 
     changes : files of the small project and their broken content
-    parts : what the message must contain: file, key, value, what is allowed
-    overrides : what ``--config`` adds
+    parts : texts that the message must contain: file, key, value, allowed values
+    overrides : settings that ``--config`` adds
     """
 
     name: str
@@ -62,7 +62,7 @@ def mesh(name: str, content: Content, *parts: str, path: str = MESH) -> Case:
 
 
 def mesh_path(name: str, path: str, *parts: str, **changes: Content) -> Case:
-    """A mesh path that must not be followed."""
+    """A mesh path that the project must refuse."""
     use = project.with_mesh(f'{{kind: file, path: "{path}"}}')
     return Case(name, {SCENE: use, **changes}, (SCENE, *parts))
 

@@ -71,7 +71,7 @@ def make_project(folder: Path, changes: Mapping[str, Content]) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     shutil.copytree(CONFIG, folder / "config", dirs_exist_ok=True)
     if not (folder / "paper").exists():
-        (folder / "paper").symlink_to(ROOT / "paper")  # its sources number the figures
+        (folder / "paper").symlink_to(ROOT / "paper")  # it numbers the figures
     files = {STUDY: SMALL_STUDY, SCENE: SMALL_SCENE, f"config/scenes/{MESH}": SQUARE}
     for path, content in [*files.items(), *changes.items()]:
         _write(folder / path, content)
@@ -95,7 +95,10 @@ def _write(path: Path, content: Content) -> None:
 
 
 def load_project(root: Path, overrides: Mapping[str, Any] | None = None) -> Plan:
-    """What the workflow does before its first job; ``overrides`` stand for ``--config``."""
+    """Plan the study as the workflow does before its first job.
+
+    ``overrides`` stand for ``--config``.
+    """
     check_files([root / STUDY])
     config = {**read_yaml(root / STUDY), **(overrides or {})}
     plan = Plan(Study(config, root))

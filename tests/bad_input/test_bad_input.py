@@ -1,5 +1,4 @@
-"""Every broken input of the corpus ends with one line that names file, key, value, and what is
-allowed."""
+"""Every broken input gives one line that names file, key, value and the allowed values."""
 
 from pathlib import Path
 

@@ -1,7 +1,7 @@
-"""Mutated configurations: accepted, or refused with a named error; never anything else.
+"""Mutated configurations are accepted or refused with a named error.
 
-Every example runs with little memory to spare, so that a needless allocation shows as a failure.
-``PDROM_EXAMPLES=1000 ./reproduce test tests/bad_input`` looks longer.
+Every example runs with little memory to spare, so that an unnecessary allocation fails.
+``PDROM_EXAMPLES=1000 ./reproduce test tests/bad_input`` tries more examples.
 """
 
 import copy
@@ -20,7 +20,7 @@ from pdrom.core.errors import PdromError
 
 SPARE_BYTES = 2_000_000_000
 FILES = ("methods", "claims")
-# One of everything that a scene may list, so that every key can be hit.
+# A scene with one entry of every kind, so that every key can be mutated.
 RICH_SCENE = """\
 name: small
 title: One of everything
@@ -102,19 +102,19 @@ def _mutate(draw: Callable, owner: Any, key: Any) -> None:
     elif action == "wrap":
         owner[key] = [owner[key]]
     else:
-        # a list that is drawn again must not show what a mutation did to it
+        # copied, because a mutation must not change the list that hypothesis draws from
         owner[key] = copy.deepcopy(draw(VALUES))
 
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A project of whose files each example overwrites one."""
+    """A project; each example overwrites one of its files."""
     return small.make_project(tmp_path_factory.mktemp("fuzz"), {})
 
 
 @pytest.fixture(autouse=True)
 def little_memory() -> Iterator[None]:
-    """No more than `SPARE_BYTES` beyond what the process has."""
+    """Limit the memory of the process to `SPARE_BYTES` more than it uses now."""
     before = resource.getrlimit(resource.RLIMIT_AS)
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + SPARE_BYTES, before[1]))
@@ -125,7 +125,7 @@ def little_memory() -> Iterator[None]:
 def accepted_or_named(
     root: Path, path: str = small.SCENE, content: Any = VALID, overrides: dict | None = None
 ) -> None:
-    """Load the project with other content of one file; its only failure is a named error."""
+    """Load the project with other content of one file; it may fail only with a named error."""
     original, message = (root / path).read_bytes(), ""
     try:
         text = content if isinstance(content, bytes) else yaml.safe_dump(content).encode()

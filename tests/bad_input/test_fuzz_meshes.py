@@ -1,7 +1,7 @@
-"""Damaged mesh files of every format: read, or refused with a named error on one line.
+"""Damaged mesh files of every format are read or refused with a named error on one line.
 
-The limits of `pdrom.model.mesh.files` bound each file, 10 s and 1 GB; here the time is a fifth of
-it.
+The reader's limits of memory and time apply (`pdrom.model.mesh.files`); the time limit is a fifth
+of the usual 10 s.
 """
 
 from collections.abc import Iterator
@@ -35,7 +35,7 @@ def damaged(content: bytes, seed: int) -> Iterator[bytes]:
 
 
 def read(path: Path) -> str:
-    """Message of the refusal, nothing if the mesh is accepted."""
+    """Message of the refusal, empty if the mesh is accepted."""
     try:
         MeshFile(kind="file", path=path.name).build(path.parent)
     except PdromError as error:

@@ -1,4 +1,4 @@
-"""Share of right estimates of frame errors, and their cost in runs in turn (add ``-s``)."""
+"""Measure accuracy and cost of estimated frame errors, in alternating runs (add ``-s``)."""
 
 import sys
 from time import process_time
@@ -15,7 +15,7 @@ def bench_frame_errors(benchmark, monkeypatch, window):
     runs = [scene_of(*each, count, window) for each in SCENES for count in (10, 30)]
     right = benchmark.pedantic(share, runs, rounds=1)
     sys.stdout.write(f"\nwindow {window}: {right:.3f} of the estimates within a factor of three\n")
-    monkeypatch.setattr("pdrom.api.runs.remedy", lambda *_: "")  # once, whatever the frames
+    monkeypatch.setattr("pdrom.api.runs.remedy", lambda *_: "")  # once, for any number of frames
     for scene in runs[::10]:
         times = {True: [], False: []}
         for turn in range(62):

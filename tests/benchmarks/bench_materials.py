@@ -1,4 +1,4 @@
-"""Iterations after which ten frames of three materials are within 1 % (config/README.md; -s)."""
+"""Measure the iterations until ten frames of three materials have errors of 1 % (add ``-s``)."""
 
 import sys
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""The largest memory of a process that trains a reduced model, and does nothing else."""
+"""Measure the peak memory of a process that only trains a reduced model."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)
 
 
 def bench_memory_of_training(benchmark):
-    """40 modes of the bar of 8,000 vertices, on converged frames; MB are in ``extra_info``."""
+    """Train 40 modes of a bar of 8,000 vertices on converged frames; ``extra_info`` has the MB."""
     command = [sys.executable, "-c", TRAIN, str(CONFIG / "scenes" / "bar80.yaml")]
     said = benchmark.pedantic(lambda: subprocess.check_output(command, text=True), rounds=1)
     benchmark.extra_info["MB"] = float(said)

@@ -27,7 +27,7 @@ WEIGHTS = {
 
 
 def held(*groups: str, **mesh: object) -> Scene:
-    """A mesh held on the left, under gravity."""
+    """A mesh under gravity whose left side is fixed."""
     effects = [{"effect": group, "weight": WEIGHTS[group]} for group in groups]
     return make_scene(GRAVITY, LEFT, *effects, mesh=mesh, frames=1)
 
@@ -60,9 +60,9 @@ KERNELS = [name for name in FAMILIES if "20x20" in name or "40x5x5" in name]
 
 
 def twisted(points: np.ndarray, turn: float = 1.5) -> np.ndarray:
-    """Points turned about x by up to ``turn`` radians and stretched by 5 %, with a small noise.
+    """Points rotated about x by up to ``turn`` radians and stretched by 5 %, with a small noise.
 
-    Hardly any element is left in its range, so that every one is projected.
+    Hardly any element is left in its range, so that almost every element is projected.
     """
     angle = turn * (points[:, 0] - points[:, 0].min()) / np.ptp(points[:, 0])
     c, s = np.cos(angle), np.sin(angle)
@@ -77,7 +77,7 @@ WINDOWS = {"plain": 0, "accelerated": 5}
 @pytest.mark.parametrize("kind", WINDOWS)
 @pytest.mark.parametrize("family", FAMILIES)
 def bench_frame(benchmark, family, kind):
-    """Frame 0 from rest, factorised beforehand."""
+    """Time frame 0 from rest, after the factorisation."""
     scene = FAMILIES[family]().changed(anderson_window=WINDOWS[kind])
     loop, start = scene.stepper(track_objective=False), scene.initial_state()
     benchmark.group = f"frame {family}"
@@ -94,7 +94,7 @@ STEPS = {"compiled": lambda group: group.for_run(), "numpy": NumpyLocalStep}
 @pytest.mark.parametrize("implementation", STEPS)
 @pytest.mark.parametrize("family", KERNELS)
 def bench_local_step(benchmark, family, implementation):
-    """One `accumulate`; ns per element are in ``extra_info``."""
+    """Time one `accumulate`; ns per element are in ``extra_info``."""
     scene = FAMILIES[family]()
     step = STEPS[implementation](scene.groups[0])
     y = twisted(scene.mesh.points)
@@ -120,7 +120,7 @@ def fixed_of(scene: Scene, solver: str):
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("family", LARGE)
 def bench_factorisation(benchmark, family, solver):
-    """From the constraint groups to a factorised system."""
+    """Time the assembly and factorisation of the system."""
     scene = FAMILIES[family]()
 
     def factorise() -> None:
@@ -134,7 +134,7 @@ def bench_factorisation(benchmark, family, solver):
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("family", FAMILIES)
 def bench_solve(benchmark, family, solver):
-    """Three right-hand sides."""
+    """Time the solves of three right-hand sides."""
     scene = FAMILIES[family]()
     system, fixed = fixed_of(scene, solver)
     elimination = system.eliminate(fixed)
@@ -158,7 +158,7 @@ def trained(name):
 @pytest.mark.parametrize("kind", RUNS)
 @pytest.mark.parametrize("name", ["bar80", "sheet100_strain", "strain_oop", "spring_oop"])
 def bench_reduced_run(benchmark, name, kind):
-    """40 frames with all positions; the deformation error is the distance to converged frames."""
+    """Time 40 frames with all positions; report their deformation error against converged frames."""
     scene, model = trained(name)
     own, solver, lift = scene.iterated(*RUNS[kind][:2]), RUNS[kind][2], model.reduced.positions
     loop, start = model.loop(own, solver=solver)

@@ -1,4 +1,4 @@
-"""What the saved benchmarks keep: statistics, processor and libraries, not every single time."""
+"""Save statistics, processor and libraries with the benchmarks, without every single time."""
 
 from typing import Any
 

@@ -1,10 +1,9 @@
-"""Compare two results folders of one configuration: tables without what a clock says, and runs.
+"""Compare two results folders of one configuration: runs, and tables without measured times.
 
 Usage: python tests/machines/same_results.py FOLDER FOLDER [--tables-only]
 
-Tables are compared as text, every digit of them; HDF5 files by the bytes of their datasets, of
-which ``timings`` are left out. The status is 0 for equal folders, 1 for others, whose differences
-are listed.
+Tables are compared as text, HDF5 files by the bytes of their datasets without ``timings``. The exit
+status is 0 for equal folders and 1 for different ones, whose differences are listed.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Bounded projections carry no run away (theorem 1 of the manuscript): random runs within it."""
+"""Bounded projections keep every run bounded (theorem 1 of the manuscript)."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def largest_projections(group: ConstraintGroup, points: np.ndarray) -> np.ndarra
 
 
 def always_free(scene: Scene) -> np.ndarray | None:
-    """Vertices that are never held; None if the held ones change."""
+    """Vertices that are never fixed; None if the set of fixed vertices changes."""
     held = [held_vertices(scene.boundaries, f) for f in range(scene.config.frames)]
     if not all(np.array_equal(h, held[0]) for h in held):
         return None
@@ -45,7 +45,7 @@ def always_free(scene: Scene) -> np.ndarray | None:
 
 
 def kept_velocity(scene: Scene) -> np.ndarray:
-    """D = 1 - h c, (N,): what a frame leaves of the difference of two velocities."""
+    """D = 1 - h c, (N,): share of the difference of two velocities that remains after a frame."""
     rates = sum((np.zeros(scene.mesh.vertices) + f.rate for f in scene.forces), np.zeros(1))
     return np.ones(scene.mesh.vertices) - scene.config.time_step * rates
 
@@ -94,7 +94,7 @@ def allowed(scene: Scene) -> np.ndarray:
 
 
 def random_scene(rng: np.random.Generator) -> Scene:
-    """Masses over two decades, any mixture of the forces with a rate, any of `HOLDS`."""
+    """Scene with masses over two decades, random forces with a rate, and one of `HOLDS`."""
     group, h = str(rng.choice(list(MESHES))), float(10.0 ** rng.uniform(-2.5, -1.0))
     effects = [GRAVITY] if rng.random() < 0.5 else []
     if rng.random() < 0.3:
@@ -113,7 +113,7 @@ def random_scene(rng: np.random.Generator) -> Scene:
 def random_forces(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, float]:
     """Forces (2 F, N, 3) of projections of each iteration, and the largest norm of them in K^+.
 
-    Random ones, or one mode in step with its own answers, which is what carries farthest.
+    The forces are random, or excite one mode in resonance, which gives the largest difference.
     """
     (group,) = scene.groups
     stiffness = group.system_matrix().toarray()
@@ -136,7 +136,7 @@ def random_forces(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, f
 
 
 def test_the_bound_of_the_theorem_holds_in_random_scenes_and_is_nearly_reached():
-    """Masses, forces, holds and pushes at random; one mode pushed in resonance comes close."""
+    """Masses, forces, fixed vertices and projections are random. A mode in resonance comes close."""
     used: list[float] = []
     for seed in range(2 * SCENES):
         if len(used) == SCENES:
@@ -154,11 +154,11 @@ def test_the_bound_of_the_theorem_holds_in_random_scenes_and_is_nearly_reached()
 
 @pytest.mark.parametrize("tangent", [0.1, 0.3, 3.0])
 def test_a_mode_driven_in_resonance_grows_by_the_closed_formula(tangent):
-    """A mode driven with the signs of its own answer; reference: the recursion of a frame."""
+    """A force with the sign of the response drives the mode; reference: the recursion of a frame."""
     m, angle = np.arange(2000), np.arctan(tangent)
     answer = np.sin(angle) * np.cos(angle) ** m * np.sin((m + 1) * angle)
     x, before = 0.0, 0.0
-    for sign in np.sign(answer[::-1]):  # (1 + t^2) x'' - 2 x' + x = t^2 with static answer 1
+    for sign in np.sign(answer[::-1]):  # (1 + t^2) x'' - 2 x' + x = t^2 with static solution 1
         x, before = (2.0 * x - before + tangent**2 * sign) / (1.0 + tangent**2), x
     assert x == pytest.approx(growth(np.array([angle]), len(m)), rel=1e-9)
     closed = 1.0 / np.tan(angle / 2.0)
@@ -170,7 +170,7 @@ def test_no_projection_is_larger_than_its_bound(group, rng):
     scene = make_scene({"effect": group, "weight": 1.0}, mesh=GROUPS[group])
     g, points = scene.group(group).for_run(), scene.mesh.points
     if g.manifold not in BOUNDED:
-        # what keeps its size may become as long as it likes, as may what names no set
+        # projections that keep their size, or name no set, have no bound
         assert g.manifold in ("size", None)
         return
     for spread in (1e-3, 1.0, 1e3):

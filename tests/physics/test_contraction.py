@@ -59,7 +59,7 @@ def _contraction(scene: Scene, reduction: Reduction, y: np.ndarray) -> float:
 def _slope(group: ConstraintGroup, y: np.ndarray) -> float:
     """Largest 2-norm of the derivative of an element's projection, by central differences.
 
-    The weights of an element are equal, so that it is that of all projections in the norm of W.
+    The weights of an element are equal, so that this is also the norm in the weights W.
     """
     shape, elements = (group.elements, group.rows_per_element, 3), np.arange(group.elements)
     strain, size = (group.S @ y).reshape(shape), 3 * group.rows_per_element
@@ -76,9 +76,9 @@ def _slope(group: ConstraintGroup, y: np.ndarray) -> float:
 @pytest.mark.parametrize("method", ["pod", "block"])
 @pytest.mark.parametrize("group", ["spring", "strain", "deformation_gradient"])
 def test_contraction_is_at_most_deim_constant_times_stiff_share(group, method):
-    """|T|_A <= gamma_W J theta: gain and derivative in the W norm, theta = h^2 w^2 / (1 + h^2 w^2).
+    """|T|_A <= gamma_W J theta with theta = h^2 w^2 / (1 + h^2 w^2); W norms of constant and slope.
 
-    With equal weights gamma_W is the gain itself.
+    With equal weights gamma_W is the DEIM constant.
     """
     scene, reduction, positions = _case(group, METHODS[method])
     g, y = scene.group(group), positions[13]
@@ -95,7 +95,7 @@ def test_contraction_is_at_most_deim_constant_times_stiff_share(group, method):
 
 
 def test_two_starts_converge_to_each_other_if_the_contraction_is_below_one():
-    """Two starts 1e-3 apart come together at the rate of the contraction number, or faster."""
+    """Two starts that differ by 1e-3 approach each other at the rate of the contraction or faster."""
     scene, reduction, positions = _case("spring", METHODS["pod"])
     (group,) = scene.groups
     assert _contraction(scene, reduction, positions[13]) < 1.0

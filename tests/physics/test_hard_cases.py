@@ -36,7 +36,7 @@ METHODS = load_methods(CONFIG / "methods.yaml")
 EXPECTED = outcomes.HardCases(**read_yaml(CONFIG / "default.yaml")["hard_cases"]).expected
 CASES, REDUCTIONS = cases(), outcomes.names(METHODS)
 SUBSPACES = [name for name in REDUCTIONS if name not in METHODS]
-EPS, OPERATIONS = np.finfo(float).eps, 32.0  # u, and c: a few roundings for each entry in a row
+EPS, OPERATIONS = np.finfo(float).eps, 32.0  # u, and c: a few errors for each entry in a row
 
 
 @cache
@@ -45,9 +45,9 @@ def training(case: str) -> outcomes.Training:
 
 
 def rises(loop: Stepper, scene: Scene, state: State, basis: Any = None) -> tuple[list[State], bool]:
-    """States of all frames, and whether round-off does not explain some rise of the objective.
+    """States of all frames, and whether the objective rises by more than rounding errors explain.
 
-    ``basis`` (N, K) are the columns of a subspace, in whose coordinates the states are.
+    ``basis`` (N, K) are the columns of a subspace; the states are coordinates in it.
     """
     h, states, risen = loop.time_step, [state], False
     rows = np.asarray(abs(scene.system.matrix).sum(axis=1)).ravel()
@@ -93,7 +93,7 @@ def is_free(scene: Scene) -> bool:
 
 
 def keeps_momentum(scene: Scene, positions: np.ndarray, v: np.ndarray) -> bool:
-    """Whether gravity alone changes the linear momentum, up to round-off of S^T W p and solver."""
+    """Whether only gravity changes the momentum, up to rounding errors of S^T W p and the solver."""
     h, masses = scene.config.time_step, scene.masses
     pull = sum((f.acceleration(positions[0], v[0]) for f in scene.forces), np.zeros(3))
     found = np.einsum("n,fna->fa", masses, v)
@@ -104,7 +104,7 @@ def keeps_momentum(scene: Scene, positions: np.ndarray, v: np.ndarray) -> bool:
 
 
 def energy_grows(scene: Scene, positions: np.ndarray, velocities: np.ndarray) -> bool:
-    """From rest it cannot: the first objective is the energy, and the implicit step damps."""
+    """Whether the energy grows: from rest it cannot, because the implicit step damps."""
     energies = []
     for q, v in zip(positions, velocities, strict=True):
         groups = [group.for_run() for group in scene.groups]
@@ -117,13 +117,13 @@ def energy_grows(scene: Scene, positions: np.ndarray, velocities: np.ndarray) ->
 
 
 def reach(scene: Scene, positions: np.ndarray) -> float:
-    """Longest side (m) of the boxes of rest shape, start and vertices held in any frame."""
+    """Longest side (m) of the boxes around rest shape, start and fixed vertices of any frame."""
     held = np.unique(np.concatenate([[], *(b.vertices for b in scene.boundaries)]).astype(int))
     moved = np.ptp(positions[:, held], axis=1).max() if len(held) else 0.0
     return max(scene.mesh.extent, float(np.ptp(positions[0], axis=0).max()), float(moved))
 
 
-# Cases whose bodies end in their rest shape up to 1 % of their extent, and that do not move.
+# Cases whose bodies end at rest in their rest shape, up to 1 % of their extent.
 RECOVER = ("inverted_strain", "inverted_rotation", "inverted_uneven", "one_tetrahedron",
            "one_iteration_inverted")  # fmt: skip
 STILL = ("half_turn_strain", "half_turn_tetrahedron", "half_turn_rotation", "volume_sheared",
@@ -147,7 +147,7 @@ def check_full_order(name: str, case: HardCase, scene: Scene) -> None:
     assert not risen
     if is_free(scene) and name != "far_away":
         assert keeps_momentum(scene, q, v)
-        # bending takes normals of the frame's beginning, so that its energy may grow
+        # bending uses the normals at the beginning of the frame, so that its energy may grow
         if not scene.forces and not v[0].any() and scene.config.groups != ["bending"]:
             assert not energy_grows(scene, q, v)
     if name in RECOVER:
@@ -171,10 +171,10 @@ def test_a_run_of_two_thousand_frames_is_bounded_and_conserves_momentum(name):
 @pytest.mark.parametrize(
     ("effects", "settings"),
     [
-        ([SPRING | {"weight": 1e16}], {"time_step": 1.0}),  # a translation of the body is round-off
-        ([SPRING], {"vertex_mass": 1e-12}),  # masses are round-off beside the stiffness
+        ([SPRING | {"weight": 1e16}], {"time_step": 1.0}),  # translations are below rounding
+        ([SPRING], {"vertex_mass": 1e-12}),  # masses are below rounding errors of the stiffness
         ([SPRING, LEFT, {"effect": "translate", "select": "left", "offset": [1, 0, 0], "over": 5}],
-         {}),  # pins and a handle want the same vertices in different places
+         {}),  # pins and a handle prescribe different positions of the same vertices
         ([SPRING, {"effect": "self_collision", "thickness": 0.0}], {}),
     ],
 )  # fmt: skip
@@ -222,7 +222,7 @@ def test_the_objective_never_rises_in_a_subspace(name, reduction):
     list(zip(cycle(["scrambled_sheet", "bar_plane_rotation"]), REDUCTIONS, strict=False)),
 )
 def test_two_runs_give_the_same_bits(name, reduction):
-    """Internal forces S^T W p sum to zero for any projections p, so that momentum is kept, too."""
+    """Also the momentum is conserved: internal forces S^T W p sum to zero for any projections p."""
     own = training(name)
     model = outcomes.reduced_model(own, reduction, METHODS)
     first, again = (outcomes.reduced_run(own, model) for _ in range(2))
@@ -232,11 +232,11 @@ def test_two_runs_give_the_same_bits(name, reduction):
 
 
 def taken(name: str) -> bool:
-    """Whether a position subspace takes all effects of a case."""
+    """Whether a position subspace accepts all effects of a case."""
     return all(EFFECTS.load(effect["effect"]).in_subspace for effect in CASES[name].effects)
 
 
-# Each effect's first case that a subspace takes, and its first that it refuses.
+# For each effect, the first case that a subspace accepts and the first that it refuses.
 FIRST = {
     (effect["effect"], taken(name)): name
     for name in reversed(CASES)
@@ -246,7 +246,7 @@ FIRST = {
 
 @pytest.mark.parametrize("name", sorted({*FIRST.values()}))
 def test_a_subspace_accepts_exactly_the_effects_that_support_it(name):
-    """A subspace that refuses an effect names it; methods in vertex positions take all effects."""
+    """The error of a subspace names the effect; methods in vertex positions accept all effects."""
     for reduction in ("pod-full", "pod"):
         found = outcomes.row(training(name), reduction, METHODS, EXPECTED)
         assert (found["outcome"] == outcomes.NOT_TAKEN) == (

@@ -1,4 +1,4 @@
-"""What every correct projective-dynamics code must satisfy, whatever the constraint group."""
+"""Properties that every correct projective-dynamics code has, for every constraint group."""
 
 import numpy as np
 import pytest

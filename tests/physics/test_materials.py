@@ -17,7 +17,7 @@ STATIC = {"time_step": 1.0, "vertex_mass": 1e-3}
 
 
 def largest_error(mesh: dict, group: dict, iterations: int) -> float:
-    """Relative error of E and nu in the middle third of a body stretched by a thousandth."""
+    """Relative error of E and nu in the middle third of a body stretched by 0.1 %."""
     scene = make_scene(LEFT, PULL, group, mesh=mesh, iterations=iterations, **STATIC)
     nu = group["poisson"]
     x, y = scene.mesh.points, scene.stepper().step(scene.initial_state(), 0)[0].positions
@@ -59,7 +59,7 @@ def square(side: int, shaken: float) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize(("side", "shaken"), [(11, 0.0), (21, 0.0), (41, 0.0), (21, 0.25)])
 def test_bending_has_the_rigidity_of_a_plate_only_if_the_boundary_is_fixed(side, shaken):
-    """With free edges, each of their vertices has a shape without energy: no stiffness in N m."""
+    """Vertices of a free edge can move without bending energy, so no stiffness in N m results."""
     held = {"effect": "pins", "select": {"kind": "boundary_loop", "index": 0}}
     pull = {"effect": "gravity", "acceleration": [0.0, -1.0, 0.0]}
     scene = build_scene(
@@ -68,6 +68,6 @@ def test_bending_has_the_rigidity_of_a_plate_only_if_the_boundary_is_fixed(side,
     )  # fmt: skip
     after, _ = scene.stepper().step(scene.initial_state(), 0)
     assert 50.0 * np.abs(after.positions[:, 1]).max() == pytest.approx(0.0040624, rel=0.01)
-    (group,), free = scene.groups, np.flatnonzero(scene.mesh.points[:, 0] > 0.12)  # one side held
+    (group,), free = scene.groups, np.flatnonzero(scene.mesh.points[:, 0] > 0.12)  # one side fixed
     energies = np.linalg.eigvalsh(group.system_matrix().toarray()[np.ix_(free, free)])
     assert np.sum(energies < 1e-9 * energies.max()) > 0.7 * len(np.setdiff1d(free, group.vertices))

@@ -1,4 +1,4 @@
-"""Patch tests: a constant strain is seen exactly; operators, energies and finite differences."""
+"""Patch tests with constant strain; energies and operators against finite differences."""
 
 import numpy as np
 import pytest

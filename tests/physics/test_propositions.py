@@ -1,4 +1,4 @@
-"""The manuscript's propositions on sampling and interpolation, each tried on numbers."""
+"""Numerical examples for the manuscript's propositions on sampling and interpolation."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from strategies import SEEDS
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 
 
-# Descent of the (sampled) objective, and what it does not imply across frames.
+# A falling (sampled) objective bounds nothing across frames.
 
 
 def test_the_energy_may_rise_although_the_objective_falls():
@@ -46,9 +46,9 @@ def _energy(scene, state):
 
 
 def test_coordinates_without_sampled_stiffness_move_on_uniformly():
-    """Coordinates in the kernel of the sampled stiffness are held by mass only: nothing bends them.
+    """Only mass acts on coordinates in the kernel of the sampled stiffness: nothing bends them.
 
-    The objective falls in every frame all the same, at a stiffness of 1e8 as well.
+    The objective falls in every frame nevertheless, also at a stiffness of 1e8.
     """
     kick = {"effect": "kick", "speed": 1.0, "seed": 3}
     scene = make_scene(kick, {"effect": "spring", "weight": 1e8}, mesh=SHEET, frames=30)
@@ -93,7 +93,7 @@ def test_a_sampled_run_stays_within_the_bound_of_the_subspace():
     assert 0.05 * bound < largest <= bound
 
 
-# What the gain bounds, in each variant.
+# Bounds by the DEIM constant, in each variant.
 
 
 def _reduction(v: np.ndarray, elements: np.ndarray, method: MethodSpec) -> Reduction:
@@ -111,10 +111,10 @@ def _orthonormal(rng: np.random.Generator, n: int, r: int) -> np.ndarray:
 @pytest.mark.parametrize("separate", [False, True], ids=["shared", "by axis"])
 @given(seed=SEEDS, r=st.integers(1, 6), t=st.floats(1e-8, 1.0), times=st.integers(1, 9))
 def test_the_deim_constant_bounds_the_error_of_a_regularised_solve(separate, seed, r, t, times):
-    """sqrt(1 + m gain^2) of the best error, and t / (sigma^2 + t) of the part in the basis.
+    """The bound: sqrt(1 + m gain^2) times the best error, t / (sigma^2 + t) times the basis part.
 
-    A row is taken m ``times``; the projections are large there, so that m matters.
-    The bounds of a basis that is orthonormal axis by axis, as of `published`, add up.
+    A row is sampled m ``times``. The projections are large there, so that m matters.
+    The bounds of a basis that is orthonormal for each axis, as of `published`, add up.
     """
     rng = np.random.default_rng(seed)
     parts = [slice(a, None, 3) for a in range(3)] if separate else [slice(None)]
@@ -136,12 +136,12 @@ def test_the_deim_constant_bounds_the_error_of_a_regularised_solve(separate, see
     assert error <= (np.sqrt(1.0 + times * made.gain**2) * best + bias) * (1 + 1e-9)
 
 
-# The smallest eigenvalue and a block of rows; its growth is bounded in test_gappy_pod_e.py.
+# The smallest eigenvalue and a block of rows; test_gappy_pod_e.py bounds its growth.
 
 
 @given(SEEDS, st.integers(2, 4), st.integers(1, 4))
 def test_equal_eigenvalues_rise_only_together(seed, multiplicity, size):
-    """With gap zero the bound is zero; the truth is, too, as long as a block has too few rows."""
+    """With gap zero the bound is zero, and so is the growth if a block has too few rows."""
     rng = np.random.default_rng(seed)
     r = multiplicity + 2
     q = _orthonormal(rng, r, r)
@@ -156,12 +156,12 @@ def test_equal_eigenvalues_rise_only_together(seed, multiplicity, size):
         assert true > 0.0
 
 
-# A bounded gain costs a share of the mesh.
+# A bounded DEIM constant requires a share of the mesh.
 
 
 @given(SEEDS, st.integers(1, 8), st.integers(1, 20))
 def test_a_bounded_deim_constant_needs_a_minimum_share_of_the_elements(seed, r, count):
-    """m >= e / (mu gain^2), mu the largest share of the modes in an element over the mean one."""
+    """m >= e / (mu gain^2); mu is the ratio of largest to mean share of the modes in an element."""
     rng = np.random.default_rng(seed)
     v = _orthonormal(rng, 60, r)
     elements = rng.permutation(20)[: max(count, -(-r // 3))]
@@ -173,7 +173,7 @@ def test_a_bounded_deim_constant_needs_a_minimum_share_of_the_elements(seed, r, 
 
 @pytest.mark.parametrize("count", [1, 5, 20])
 def test_evenly_spread_modes_need_exactly_the_minimum_share_of_the_elements(count, rng):
-    """e blocks with orthonormal columns over sqrt(e): m of them have the gain sqrt(e / m)."""
+    """For e blocks of orthonormal columns over sqrt(e), m of them have the constant sqrt(e / m)."""
     blocks = [_orthonormal(rng, 3, 3) / np.sqrt(20) for _ in range(20)]
     v = np.concatenate(blocks)
     elements = rng.permutation(20)[:count]

@@ -1,4 +1,4 @@
-"""The scenes that verdicts rest on are well posed: round-off does not decide their motion."""
+"""Rounding errors do not decide the trajectories of the scenes on which verdicts are based."""
 
 import pytest
 
@@ -16,7 +16,7 @@ WELL_POSED = sorted(
 
 
 def floor(name: str) -> float:
-    """Largest relative difference of a run that started 1e-10 of the extent apart."""
+    """Largest relative difference of two runs that start 1e-10 of the extent apart."""
     scene = load_bound_scene(ROOT, name)
     other = trajectory(scene, perturbation_field(scene, 1e-10, seed=1))
     return float(relative_difference(other, trajectory(scene)).max())

@@ -1,4 +1,4 @@
-"""The package from Python: the page's example, runs, their files and pictures, and faults."""
+"""The package in Python: the example of its page, runs, their files and pictures, and errors."""
 
 import copy
 import inspect
@@ -161,7 +161,7 @@ CORNER = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 def given(mesh, folder=".", **keys) -> Scene:
-    """A scene on a mesh, without a side that is held."""
+    """A scene on a mesh, without fixed vertices."""
     return api.build_scene(folder, mesh=mesh, frames=4, effects=[EFFECTS[0], EFFECTS[2]], **keys)
 
 
@@ -172,7 +172,7 @@ def test_a_mesh_is_given_as_arrays(tmp_path):
     solid = given((np.array(CORNER), np.array([[0, 2, 1, 3]], dtype=np.uint64)))
     assert (len(solid.mesh.tetrahedra), len(solid.mesh.triangles)) == (1, 4)
     larger = given((2.0 * np.array(SQUARE), HALVES))
-    assert larger.config != scene.config  # or two meshes would count as one scene
+    assert larger.config != scene.config  # otherwise two meshes would count as one scene
     run = api.run(scene, tmp_path / "given.h5")
     read = api.load(tmp_path / "given.h5")
     assert np.array_equal(read.positions, run.positions)
@@ -185,7 +185,7 @@ def copies(value):
 
 
 def test_scenes_and_runs_are_copied_and_pickled(full, reduced):
-    assert full.scene.system is not None  # what a run leaves behind does not hinder
+    assert full.scene.system is not None  # data that a run has cached do not prevent copies
     for scene in copies(full.scene):
         assert scene is not full.scene
         assert scene.config == full.scene.config

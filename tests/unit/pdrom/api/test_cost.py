@@ -1,4 +1,4 @@
-"""What accuracy costs: the table of settings, coarser meshes and models, and its refusals."""
+"""The table of costs against errors of settings, coarser meshes and models, and its errors."""
 
 from importlib import import_module
 
@@ -84,7 +84,7 @@ def test_a_rigid_body_has_no_deformation_error_a_diverged_one_an_infinite_error(
 
 
 def test_a_coarser_grid_on_which_an_effect_is_impossible_is_left_out(caplog):
-    place = sheet(size=13).mesh.points[6 + 13]  # none of the grid with a quarter of the cells
+    place = sheet(size=13).mesh.points[6 + 13]  # no vertex of the grid with a quarter of the cells
     near = np.array([0.01, 1.0, 0.01])
     box = {"kind": "box", "lower": list(place - near), "upper": list(place + near)}
     table = api.cost(sheet(GRAVITY, SPRING, {"effect": "pins", "select": box}, size=13, frames=2))

@@ -1,4 +1,4 @@
-"""Reduced models from Python: training, runs, errors, files, and what is refused."""
+"""Reduced models in Python: training, runs, errors, files, and refused arguments."""
 
 import re
 from concurrent.futures import ThreadPoolExecutor
@@ -49,7 +49,7 @@ def model(full) -> api.Model:
     ids=["weight", "handle", "release and floor", "obstacle", "kick and damping"],
 )  # fmt: skip
 def test_a_model_of_all_columns_and_elements_repeats_the_full_order_run(full, effects):
-    """Same local-global iterations; weights, masses, forces, holds and the time step differ."""
+    """Weights, masses, forces, fixed vertices and the time step differ from the training."""
     every = api.train(full, basis=np.eye(30), tolerance=None, converged=False)
     other = scene(*effects, time_step=0.011, vertex_mass=3.0, iterations=7)
     expected = api.run(other)

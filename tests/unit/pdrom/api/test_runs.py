@@ -1,4 +1,4 @@
-"""Runs that go on from another run, and uniform initial velocities."""
+"""Runs that continue another run, and uniform initial velocities."""
 
 import h5py
 import numpy as np
@@ -29,7 +29,7 @@ def test_a_uniform_velocity_gives_the_closed_formula_of_free_flight():
 
 @pytest.mark.parametrize("group", ["spring", "strain", "bending", "deformation_gradient"])
 def test_a_continued_run_equals_the_uninterrupted_run_bit_for_bit(group, tmp_path):
-    """With holds that began before and end later, contacts, forces, and from a file."""
+    """With vertices fixed across the break, contacts and forces; the run is also read from a file."""
     effects = GRAVITY, VELOCITY, HANDLE, ENDING, BALL, {"effect": group, "weight": 1e4}
     keys = {"mesh": GROUPS[group], "anderson_window": 3 * (group == "spring")}
     whole = api.run(scene(*effects, **keys), tmp_path / "whole.h5")
@@ -44,7 +44,7 @@ def test_a_continued_run_equals_the_uninterrupted_run_bit_for_bit(group, tmp_pat
 
 
 def test_a_run_of_another_scene_continues_a_run_and_records_it(tmp_path):
-    """A hold that the first run has not begins where its vertices are then."""
+    """Vertices that the first run did not fix are fixed at their current positions."""
     first, own = api.run(scene(GRAVITY, VELOCITY, SPRING)), scene(SPRING, ENDING)
     found, bottom = api.run(own, start=first, frame=6), own.boundaries[0].vertices
     assert np.array_equal(found.positions[:7], first.positions[:7])

@@ -1,4 +1,4 @@
-"""The command line: each command does its work, says it in a line, and ends with its code."""
+"""The command line: each command does its work, reports it in a line, and exits with its code."""
 
 import io
 import os
@@ -66,7 +66,7 @@ def test_a_scene_is_run_a_model_trained_and_run_and_all_is_shown(folder, capsys)
     goes_on = ["run", "small.yaml", "--from", "small.h5", "--frame", "5", "--out", "later.h5"]
     assert run(goes_on) == Status.DONE
     assert np.array_equal(load("later.h5").positions, load("small.h5").positions)
-    assert not list(folder.glob(".*"))  # no hidden file beside a user's own
+    assert not list(folder.glob(".*"))  # no hidden file next to the user's files
     capsys.readouterr()
     assert run(["show", "small.yaml"]) == run(["show", "small.model.h5"]) == Status.DONE
     shown = capsys.readouterr().out
@@ -183,7 +183,7 @@ def test_a_new_scene_is_valid_and_replaces_nothing(folder, capsys):
     ],
 )
 def test_every_commented_effect_of_a_new_scene_is_valid(folder, mesh, listed, others):
-    """Its sides, places and groups fit the mesh, whatever axis is up."""
+    """The sides, positions and groups of the effects fit the mesh, for every vertical axis."""
     text = template("it's", 'o\'b "1" ü.obj', mesh)
     scene = SceneConfig.model_validate(yaml.safe_load(text))
     assert {*scene.groups, *scene.reduce} == listed
@@ -200,7 +200,7 @@ SEAM = "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 {0}\nv 0 0 {1}\nv 1 0 1\nf 1 2 3\nf 4 6
 
 
 def test_an_open_seam_is_named_and_merged(folder, capsys, caplog):
-    """Vertices that nearly coincide, or are exact copies, and a vertex in no element."""
+    """The mesh has vertices that coincide nearly or exactly, and a vertex in no element."""
     (folder / "a.obj").write_text(SEAM.format("1e-7", "1.0000001"))
     assert run(["new", "a", "--mesh", "a.obj"]) == Status.DONE
     found = "2 connected parts, 2 pairs of vertices closer than 1e-06 of the extent"
@@ -218,7 +218,7 @@ def test_an_open_seam_is_named_and_merged(folder, capsys, caplog):
 
 
 def test_a_new_scene_describes_its_mesh(folder, capsys):
-    """Also where a quote is in the name of the mesh, and the scene lies in another folder."""
+    """The name of the mesh contains a quote, and the scene lies in another folder."""
     (folder / "in").mkdir()
     mesh = cloth(4, 3, "xz", lift=-7.0)
     meshio.write("in/o'b.obj", meshio.Mesh(mesh.points, [("triangle", mesh.triangles)]))
@@ -237,7 +237,7 @@ def test_a_new_scene_describes_its_mesh(folder, capsys):
 @pytest.mark.parametrize("mesh", [cloth(4, 3, "xz", extent=200.0), bar(3, 2, 2, extent=0.01)])
 @pytest.mark.parametrize("up", [0, 1, 2])
 def test_a_new_scene_has_a_material_lengths_of_its_mesh_and_a_floor_below_it(up, mesh):
-    """Water or cotton; what the pins are carried by is half the extent."""
+    """The material is water or cotton; the pins move by half the extent."""
     text = template("a", "a.obj", mesh, up="xyz"[up])
     scene = Scene.build(SceneConfig.model_validate(yaml.safe_load(text)), mesh)
     density = 1000.0 if len(mesh.tetrahedra) else 0.2
@@ -251,7 +251,7 @@ def test_a_new_scene_has_a_material_lengths_of_its_mesh_and_a_floor_below_it(up,
 
 
 def test_a_new_sheet_sags_by_the_same_length_on_a_refined_mesh():
-    """Hanging, damped until it rests, each frame iterated to less than 1 %."""
+    """The sheet hangs and is damped until it rests; each frame has an error below 1 %."""
     keys, sags = yaml.safe_load(template("a")), []
     keys["effects"] += [{"effect": "damping", "rate": 10.0}, {"effect": "pins", "select": "top"}]
     keys["effects"] = [e for e in keys["effects"] if e.get("select") != "x_min"]
@@ -357,7 +357,7 @@ def test_missing_inputs_and_unwritable_outputs_are_reported_before_a_run_begins(
 def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     called = line.replace("pdrom", f'"{sys.executable}" -m pdrom')
     command = ["bash", "-o", "pipefail", "-c", called]
-    # as a user's: the output waits in a buffer until the end
+    # buffered until the end, as the output of a user's command
     own = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, env=own, check=False)
 
@@ -448,7 +448,7 @@ REPORT = FrameReport(np.zeros(0), np.array([0.0, 1e-3, 1e-3, 0.0]))
 
 
 def test_progress_on_a_terminal_is_one_line_that_is_written_again(monkeypatch):
-    """A fifth of a second apart; the frame that may compile kernels is no measure of the others."""
+    """The line changes five times a second; its estimate ignores a frame that compiles kernels."""
     stream = io.StringIO()
     stream.isatty = lambda: True
     times = iter([0.0, 50.0, *(50.0 + 0.125 * frame for frame in range(1, 10))])

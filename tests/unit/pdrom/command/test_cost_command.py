@@ -1,4 +1,4 @@
-"""``pdrom cost``: the table that it prints, its picture, and what it refuses before it runs."""
+"""``pdrom cost``: the printed table, its picture, and arguments that are refused before a run."""
 
 import os
 from pathlib import Path
@@ -15,7 +15,7 @@ from pdrom.model.mesh.generators import cloth
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder with a scene, and a coarser mesh in a folder beside the scene."""
+    """A working folder with a scene, and a folder next to it with a coarser mesh."""
     monkeypatch.chdir(tmp_path)
     Path("scenes").mkdir()
     Path("scenes/small.yaml").write_text(SMALL, encoding="utf-8")

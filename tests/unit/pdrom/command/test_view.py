@@ -1,4 +1,4 @@
-"""pdrom view: a page, a picture and files for ParaView, of every kind of run."""
+"""``pdrom view``: a page, a picture and files for ParaView, for every kind of run."""
 
 import json
 import shutil

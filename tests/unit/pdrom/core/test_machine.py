@@ -20,7 +20,7 @@ def test_the_record_names_threads_cores_processor_and_libraries():
 
 
 def test_the_record_names_the_kernels_that_are_loaded():
-    """NumPy and SciPy have a library each, and nothing says where they lie on the disk."""
+    """NumPy and SciPy have one library each, and the record contains no path."""
     kernels = loaded_kernels()
     pools = threadpool_info()
     assert len(kernels) == len(pools)

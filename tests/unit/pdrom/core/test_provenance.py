@@ -1,4 +1,4 @@
-"""Provenance of results: the same for equal jobs, different for different settings."""
+"""Provenance of results: equal for equal jobs, different for different settings."""
 
 import json
 from importlib.metadata import version

@@ -1,4 +1,4 @@
-"""YAML: plain, without repeated keys, and faults that name file, key and value; long names."""
+"""YAML files: plain, without repeated keys; errors name the file, the key and the value."""
 
 import pytest
 from pydantic import Field
@@ -49,7 +49,7 @@ def written(tmp_path, content: str | bytes):
 def test_plain_yaml_is_read(tmp_path):
     path = written(tmp_path, "a: 1\nb: [1.5, x, null]\nc: {d: true}\n")
     assert read_yaml(path) == {"a": 1, "b": [1.5, "x", None], "c": {"d": True}}
-    # a byte order mark is no part of the text
+    # a byte order mark does not belong to the text
     assert read_yaml(written(tmp_path, b"\xef\xbb\xbfa: 1\n")) == {"a": 1}
 
 

@@ -1,4 +1,4 @@
-"""Damage of any kind, in a result or in its checksum, is noticed and leads to a new file."""
+"""Any damage of a result or its checksum is noticed, and the file is made again."""
 
 import errno
 import hashlib
@@ -54,8 +54,8 @@ def places(checksum: bytes) -> list[int]:
 def noticed(path: Path, content: bytes | None = None, checksum: bytes | None = None) -> bool:
     """Replace the file's bytes or its checksum; return True if every reader reports the damage.
 
-    A job renames the damaged file, any other reader leaves it, and also who takes a file without
-    a checksum refuses it. The old files are restored.
+    A job renames the damaged file; every other reader leaves it in place, and a reader that accepts
+    files without a checksum refuses it, too. The old files are restored.
     """
     before = {p: p.read_bytes() for p in path.parent.iterdir()}
     if content is not None:
@@ -86,7 +86,7 @@ def flipped(content: bytes, bit: int) -> bytes:
 
 
 def damages(content: bytes) -> Iterator[bytes]:
-    """The content with an overwritten end, cut, with a line lost or repeated, with bytes behind."""
+    """The content with an overwritten end, cut, with a line removed or repeated, with more bytes."""
     for count in (1, 512, 4096):
         kept = content[: max(0, len(content) - count)]
         yield from (kept.ljust(len(content), filler) for filler in (b"\0", b"\xff"))
@@ -108,7 +108,7 @@ def test_every_damage_of_a_result_is_noticed(result):
 def test_every_changed_bit_and_every_cut_of_the_checksum_is_noticed(result):
     checksum = checksum_of(result)
     flips = [flipped(checksum, 8 * i + i % 8) for i in places(checksum)]
-    # an HDF5 file that has lost its whole block is a file without a checksum
+    # an HDF5 file without its first block is a file without a checksum
     cuts = [checksum[:kept] for kept in places(checksum) if kept or result.suffix != ".h5"]
     for changed in (*flips, *cuts, checksum + b"\n", checksum.upper()):
         assert noticed(result, checksum=changed)
@@ -145,7 +145,7 @@ def test_only_a_job_renames_a_copy_that_lost_its_checksum_others_refuse_it(resul
     ("number", "aside"), [(errno.EIO, True), (errno.EACCES, False), (errno.ENOMEM, False)]
 )
 def test_only_damaged_files_are_renamed_not_unreadable_ones(tmp_path, monkeypatch, number, aside):
-    """A file that may not be read, or not now, is not damaged."""
+    """A file without permission to read, or one that fails temporarily, is not damaged."""
     path = tmp_path / "t.csv"
     write_result(path)
 

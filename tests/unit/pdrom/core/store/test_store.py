@@ -77,9 +77,9 @@ write_text("new", path)
 @pytest.mark.parametrize("existed", [False, True])
 @pytest.mark.parametrize("count", [0, 1])
 def test_a_kill_between_checksum_and_file_is_repaired_by_the_next_write(tmp_path, existed, count):
-    """The old file is intact, or noticed as damaged; a file without a checksum is never left.
+    """The old file is intact or noticed as damaged; no file remains without a checksum.
 
-    What the killed process left goes with the next write, and nothing else.
+    The next write removes the files of the killed process, and no others.
     """
     path, other = tmp_path / "result.txt", tmp_path / ".results.0123456789ab.txt"
     other.write_text("of another file")
@@ -147,7 +147,7 @@ def test_an_hdf5_file_that_refers_to_other_files_is_refused(tmp_path, kind):
         file["x"] = np.zeros(4)
     with h5py.File(path, "w") as file:
         inside = file.create_group("inside")
-        inside["back"] = file  # a circle of groups
+        inside["back"] = file  # groups that contain each other
         store.require_self_contained(file, path)
         if kind == "external":
             inside["x"] = h5py.ExternalLink(str(other), "/x")
@@ -174,7 +174,6 @@ TABLE = pd.DataFrame(
 
 
 def test_a_table_is_read_as_it_was_written(tmp_path):
-    """Empty cells and digits, too."""
     path = tmp_path / "t.csv"
     store.write_table(TABLE, path)
     lines = b"scene,r,error,finite\na,1,0.1,True\nb,,,False\nc,3,1e-300,True\n"
@@ -240,7 +239,7 @@ except StorageError as error:
 def test_a_full_disk_in_the_middle_of_a_file_leaves_no_file(tmp_path):
     """The child process limits the size of its files, which acts like a full disk."""
     path = tmp_path / "result.h5"
-    # the data file of the coverage measurement would exceed the limit, too
+    # the data file of a coverage measurement would also exceed the limit
     variables = {k: v for k, v in os.environ.items() if not k.startswith("COVERAGE")}
     done = subprocess.run(
         [sys.executable, "-c", LIMITED, path], capture_output=True, text=True, check=False,
@@ -252,7 +251,7 @@ def test_a_full_disk_in_the_middle_of_a_file_leaves_no_file(tmp_path):
 
 @pytest.fixture
 def plain(tmp_path):
-    """An HDF5 file as an older pdrom wrote it: its checksum is in a hidden file beside it."""
+    """An HDF5 file of an older pdrom, with its checksum in a hidden file next to it."""
     path = tmp_path / "old.h5"
     with h5py.File(path, "w") as file:
         file["x"] = np.arange(1000)
@@ -275,7 +274,7 @@ def test_a_file_without_a_checksum_inside_is_refused_unless_it_is_allowed(plain)
 
 @pytest.mark.parametrize("damaged", [True, False])
 def test_an_error_while_reading_leads_to_another_check(tmp_path, damaged):
-    """A file damaged after the first check is renamed; any other read error is not damage."""
+    """A file damaged after the first check is renamed; other read errors rename nothing."""
     path = tmp_path / "a.h5"
     with made_by("job", {}, "c0de"), store.write_hdf5(path) as file:
         file["x"] = 1

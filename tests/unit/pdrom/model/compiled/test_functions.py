@@ -1,4 +1,4 @@
-"""One process compiles a function, and loops have arguments of one type."""
+"""A function is compiled by one process, and compiled loops have arguments of one type."""
 
 import os
 import subprocess

@@ -1,6 +1,6 @@
-"""Rows of four: where they begin, which arrays share them, and products of three with a vector.
+"""Padded rows of four: alignment, shared arrays, and products of three entries with a vector.
 
-Products of whole numbers are exact in every order of the sums.
+Products of integers are exact in every order of summation.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
-"""Degenerate elements: none spoils another one, and none leaves what it is projected on.
+"""Degenerate elements change no other element, and their projections lie on the manifold.
 
-Elements with the unit simplex as rest shape have S q = F^T exactly, so that F itself is chosen.
-Volumes and areas: the compiled projections against bisection, and against their definition.
+Elements with the unit simplex as rest shape have S q = F^T exactly, so that F can be chosen.
+The compiled projections of volumes and areas are compared with bisection and their definition.
 """
 
 from copy import copy
@@ -40,7 +40,7 @@ def test_an_element_that_is_not_finite_changes_no_other_element(kind, bad, rng):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_element_has_the_same_bits_whichever_elements_share_its_block(kind, rng):
-    """Neighbours in a block take part in the same loops, but change nothing."""
+    """Elements of a block are computed in the same loops."""
     count, alone = 2 * LANES + 3, group_of(kind, 1)
     noise = rng.standard_normal((count, alone.rows_per_element, 3))
     noise *= 10.0 ** rng.uniform(-9, 1, (count, 1, 1))
@@ -78,10 +78,10 @@ def half_spheres(h: np.ndarray, n: np.ndarray, magnitude: float, compiled: bool)
 def test_bending_near_the_pole_stays_in_its_half_sphere(
     compiled, seed, exponent, length, magnitude
 ):
-    """H = -n + t u: the difference of H and its part along n is round-off for small t.
+    """H = -n + t u: the difference of H and its part along n is a rounding error for small t.
 
-    The nearest point is m u; p lies on the rim, stays where it is when it is projected again, and
-    is no farther from H.
+    The nearest point is m u; p lies on the rim, stays there when it is projected again, and is no
+    farther from H.
     """
     rng = np.random.default_rng(seed)
     turns = np.stack([random_rotation(rng) for _ in range(40)])
@@ -99,9 +99,9 @@ def test_bending_near_the_pole_stays_in_its_half_sphere(
 
 LOW, HIGH = 0.99, 1.01
 ROWS = {"volume": 3, "area": 2}
-COUNT = 40  # more than a block of lanes
+COUNT = 40  # more than one block of lanes
 
-# round-off, flat, repeated, in range, far too large, and any size
+# rounding errors, flat, repeated, in range, far too large, and any size
 SIZES = st.one_of(
     st.sampled_from([0.0, 1e-300, 1e-17, 1e-8, 0.1, 0.99, 1.0, 1.01, 1.9, 2.0, 3.0]),
     st.floats(0.0, 4.0),
@@ -121,7 +121,7 @@ def signed(f: np.ndarray) -> np.ndarray:
 
 @st.composite
 def matrices(draw, kind: str) -> np.ndarray:
-    """F^T of `COUNT` elements: one set of singular values, maybe mirrored, in many frames."""
+    """F^T of `COUNT` elements: one set of singular values, possibly mirrored, in many rotations."""
     rows = ROWS[kind]
     sigma = np.array([draw(SIZES) for _ in range(rows)])
     if draw(st.booleans()):
@@ -148,7 +148,7 @@ def test_a_projection_is_in_range_and_as_near_as_the_nearest_point_by_bisection(
     distance, nearest = (np.linalg.norm((f - x) / scale, axis=(1, 2)) for x in (p, reference))
     assert np.isfinite(p).all()
     assert (np.abs(distance - nearest) <= 1e-11).all()
-    # what a matrix of this size can hold of its smallest singular values
+    # the accuracy of the smallest singular values in a matrix of this size
     size = signed(p).prod(axis=1)
     rounding = 1e-13 * scale ** ROWS[kind]
     assert ((size >= LOW - rounding) & (size <= HIGH + rounding)).all()
@@ -158,7 +158,7 @@ def test_a_projection_is_in_range_and_as_near_as_the_nearest_point_by_bisection(
 @settings(max_examples=40)
 @given(data=st.data())
 def test_projecting_twice_changes_nothing_and_rotations_commute_with_projections(kind, data):
-    """Q F projects to Q p, for a generic F: of others p need not be unique."""
+    """Q F projects to Q p for a generic F; otherwise p need not be unique."""
     f = data.draw(matrices(kind))
     assume(np.abs(f).max() < 100.0)
     once = projected(GROUPS[kind], f)

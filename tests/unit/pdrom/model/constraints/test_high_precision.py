@@ -1,6 +1,7 @@
-"""Compiled projections against mpmath on hard matrices, straight from their definitions.
+"""Compiled projections of hard matrices agree with their definitions in mpmath.
 
-Where the nearest point is not unique, its distance is compared, and that it lies on the manifold.
+Where the nearest point is not unique, the test compares its distance and requires that it lies on
+the manifold.
 """
 
 import math
@@ -17,7 +18,7 @@ from pdrom.model.effects import EFFECTS
 from pdrom.model.mesh.generators import cloth
 from strategies import SEEDS
 
-# A backward stable projection is wrong by a few round-offs times the condition number.
+# A backward stable projection has an error of a few rounding errors times the condition number.
 STABLE = 20.0 * np.finfo(float).eps
 
 
@@ -31,7 +32,7 @@ KINDS = {name: EFFECTS.load(name) for name in (*CLAMPED, *groups_on("length"))}
 
 
 def test_every_registered_group_is_tested():
-    """A further group that says what it projects on is tested, without a list of names."""
+    """A new group that declares its manifold is tested without another entry."""
     assert CLAMPED == ["strain", "tetrahedron_strain", "deformation_gradient"]
     assert groups_on("length") == ["spring"]
     assert groups_on("half sphere") == ["bending"]
@@ -109,7 +110,7 @@ CASES = [(name, {}) for name in CLAMPED] + [
 
 
 def digits_for(*arrays: np.ndarray) -> int:
-    """Digits that keep 50 after squares and differences of the entries of ``arrays``."""
+    """Digits that leave 50 after squares and differences of the entries of ``arrays``."""
     entries = np.abs(np.concatenate([np.ravel(a) for a in arrays]))
     entries = entries[entries > 0.0]
     spread = np.ptp(np.log10(entries)) if len(entries) else 0.0
@@ -142,7 +143,7 @@ def nearest(group: ConstraintGroup, d: np.ndarray) -> tuple[mpmath.matrix, mpmat
 def outside(group: ConstraintGroup, p: np.ndarray) -> float:
     """Distance of the singular values of p from the range of the group.
 
-    A wrong orientation counts fully.
+    A wrong orientation counts as a distance, too.
     """
     low, high = group.kernel_parameters()
     sigma = np.linalg.svd(p, compute_uv=False)
@@ -199,12 +200,14 @@ CURVED = {
 
 @pytest.mark.parametrize("state", CURVED)
 def test_projections_of_bending_are_accurate(state, rng):
-    """The condition number: the terms that cancel in H = row y over |H|, and where H is on the
-    wrong side, over the distance of its direction from the opposite pole."""
+    """Condition number: the terms that cancel in H = row y over |H|.
+
+    For H on the wrong side also over the distance of its direction from the opposite pole.
+    """
     mesh, kind = cloth(6, 6, "xz", wave=0.1), EFFECTS.load("bending")
     group = kind(kind.Config(weight=1.0), mesh, np.ones(mesh.vertices)).for_run()
     y = CURVED[state](mesh.points, rng)
-    group.begin_frame(mesh.points)  # normals of the rest shape in every state
+    group.begin_frame(mesh.points)  # in every state with the normals of the rest shape
     for element in rng.permutation(group.elements)[:16]:
         row, pole = group.S[[element]].toarray(), group.side[element] * group.normals[element]
         used = np.flatnonzero(row)

@@ -1,6 +1,6 @@
-"""Compiled kernels against the NumPy reference, and projections against their definition.
+"""Compiled kernels agree with the NumPy reference, and projections with their definition.
 
-Elements of an unstructured mesh are visited in an order of their own, which nobody sees.
+Kernels visit the elements of an unstructured mesh in an internal order.
 """
 
 import numpy as np
@@ -29,9 +29,9 @@ STATES = {
 
 @pytest.mark.parametrize("state", STATES)
 def test_kernels_are_finite_deterministic_and_equal_the_numpy_reference(group_scene, rng, state):
-    """At regular states p is unique: compiled and NumPy agree to round-off.
+    """At regular states p is unique: compiled and NumPy results agree up to rounding errors.
 
-    A gradient kernel sees S q and its parameters only, of some elements, called by its address.
+    A gradient kernel, called by its address, sees only S q and the parameters of some elements.
     """
     group = group_scene.groups[0].for_run()
     y = STATES[state](group_scene.mesh.points, rng)
@@ -43,7 +43,7 @@ def test_kernels_are_finite_deterministic_and_equal_the_numpy_reference(group_sc
         return
     d = (group.S @ y).reshape(group.elements, group.rows_per_element, 3)
     reference = group.reference_project(d, np.arange(group.elements)).reshape(-1, 3)
-    # at the rest state bending divides round-off by round-off only where the rest is flat
+    # at rest, bending divides rounding errors by rounding errors only where the mesh is flat
     assert whole == pytest.approx(reference, rel=1e-10, abs=1e-10)
     elements = np.arange(0, group.elements, 3)
     expected = group.project_elements(y, elements).reshape(len(elements), -1, 3)
@@ -123,7 +123,7 @@ def test_results_of_a_group_are_in_the_element_order_of_the_mesh(effect):
 
 
 def test_compiled_iterations_add_all_groups():
-    """Several frames: without the compiled loop, Python code calls each group's kernel."""
+    """In several frames; without the compiled loop, Python code calls each group's kernel."""
     effects = [{"effect": name, "weight": 1e3} for name in ("bending", "spring", "strain")]
     scene = make_scene(GRAVITY, LEFT, *effects, mesh=GROUPS["bending"])
     compiled, plain = scene.stepper(), scene.stepper()

@@ -12,7 +12,7 @@ import pdrom
 
 
 def test_an_edit_of_an_inlined_function_reaches_every_kernel(tmp_path):
-    """The spring's own file stays as it is, its cached kernel must not."""
+    """The file of the spring does not change, but its cached kernel must."""
     shutil.copytree(
         Path(pdrom.__file__).parent,
         tmp_path / "src" / "pdrom",

@@ -1,4 +1,4 @@
-"""Errors of frames, the notice of a run, its check by a second run, iterations until an error."""
+"""Estimated frame errors, the notice of a run, checks by a second run, iterations to an error."""
 
 import re
 

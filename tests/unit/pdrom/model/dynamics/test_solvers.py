@@ -1,6 +1,6 @@
 """Backends of the global step against dense elimination; Anderson acceleration against GMRES.
 
-The latter are equivalent on affine maps (Walker, Ni 2011).
+Anderson acceleration and GMRES are equivalent on affine maps (Walker, Ni 2011).
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ NAMES = sorted(SOLVERS)
 @pytest.mark.parametrize("name", NAMES)
 @given(n=st.integers(1, 60), seed=st.integers(0, 2**31))
 def test_a_solver_gives_the_solution_of_the_dense_matrix(name, n, seed):
-    """One factorisation serves many solves, and ignores later changes of the matrix."""
+    """One factorisation is used for many solves and does not see later changes of the matrix."""
     rng = np.random.default_rng(seed)
     root = sparse.random_array((n, n), density=min(1.0, 4.0 / n), rng=rng, format="csr")
     matrix = sparse.csr_array(root @ root.T + sparse.eye_array(n))
@@ -39,7 +39,7 @@ def test_a_solver_gives_the_solution_of_the_dense_matrix(name, n, seed):
 @pytest.mark.parametrize("pivot", [0.0, -1.0])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_singular_or_indefinite_matrix_raises_the_same_error_in_every_solver(name, pivot):
-    """SuperLU factors an indefinite one without a word; a Cholesky factor it has none."""
+    """SuperLU factorises an indefinite matrix without an error; no Cholesky factor of it exists."""
     matrix = sparse.csr_array(np.diag([1.0, pivot, 2.0]))
     message = "size 3: not positive definite" if pivot else "size 3"
     with pytest.raises(SolverError, match=message):
@@ -80,7 +80,7 @@ def test_an_infinite_mass_is_refused():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_masses_below_rounding_errors_are_refused_unless_the_body_is_fixed(name):
-    """A free body: nothing but inertia holds a translation, and inertia is lost in the matrix."""
+    """Only inertia resists the translation of a free body, and the matrix loses it to rounding."""
     scene = make_scene({"effect": "spring", "weight": 1e6}, vertex_mass=1e-12)
     with pytest.raises(SolverError, match=r"for the weights|not positive definite"):
         scene.system_with(name).eliminate(np.empty(0, dtype=np.int64))
@@ -93,8 +93,10 @@ def test_masses_below_rounding_errors_are_refused_unless_the_body_is_fixed(name)
 
 
 def test_anderson_residuals_are_those_of_gmres(rng):
-    """With an unlimited window step m + 1 is the image of the m-th iterate of GMRES (here by dense
-    least squares over the Krylov space), of a symmetric contraction."""
+    """With an unlimited window, step m + 1 is the image of the m-th iterate of GMRES.
+
+    Reference: dense least squares over the Krylov space, for a symmetric contraction.
+    """
     q, _ = np.linalg.qr(rng.standard_normal((12, 12)))
     matrix = q * np.linspace(0.3, 0.95, 12) @ q.T
     shift = np.repeat(rng.standard_normal((12, 1)), 3, axis=1)

@@ -1,4 +1,4 @@
-"""Whole frames in compiled code: bit for bit those of the loop through Python."""
+"""Frames in compiled code equal those of the Python loop bit for bit."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def own(name: str) -> Scene:
 
 
 def assert_same(scene: Scene, loop: Stepper) -> None:
-    """The frames of ``loop`` against those that an observer keeps in Python."""
+    """Compare the frames of ``loop`` with those of a loop whose observer keeps it in Python."""
     plain = scene.stepper()
     state, frames = scene.initial_state(), range(scene.config.frames)
     for frame, (found, report) in zip(frames, loop.run(state, frames), strict=True):
@@ -55,7 +55,7 @@ def assert_same(scene: Scene, loop: Stepper) -> None:
 
 @pytest.mark.parametrize("name", OWN)
 def test_frames_computed_at_once_equal_those_of_the_loop_and_need_few_calls(name):
-    """A call does many frames where nothing is left to Python."""
+    """One compiled call computes many frames if no Python code is needed between them."""
     loop, calls = own(name).stepper(), []
     whole = loop._whole
     assert (whole is None) == (name in ("plane", "bending", "wind"))

@@ -1,4 +1,4 @@
-"""Drag and wind: exact where a solution is known, with no more energy; keyframes are met."""
+"""Drag and wind: known solutions are exact, energy never grows, keyframes are reached."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ H = 0.016
 
 
 def kicked(scene, positions, velocities):
-    """Velocities after the forces of one frame alone."""
+    """Velocities after only the forces of one frame."""
     (force,) = scene.forces
     return velocities + scene.config.time_step * force.acceleration(positions, velocities)
 
@@ -48,7 +48,7 @@ def test_wind_accelerates_a_flat_sheet_as_the_differential_equation_does():
         v = kicked(scene, scene.mesh.points, v)
     expected = 40.0 - 40.0 / (1.0 + (1.5 / 0.3) * 40.0 * 5 * H)
     assert v == pytest.approx(np.tile([0.0, 0.0, expected], (16, 1)))
-    # a sheet edge on feels none
+    # a sheet parallel to the wind has no force
     scene = make_scene(SPRING, {"effect": "wind", "velocity": [300, 100, 0]})
     rest = np.zeros_like(scene.mesh.points)
     assert np.array_equal(kicked(scene, scene.mesh.points, rest), rest)
@@ -56,7 +56,7 @@ def test_wind_accelerates_a_flat_sheet_as_the_differential_equation_does():
 
 @given(seed=SEEDS, speed=st.floats(0.0, 6.0), mass=st.floats(-6.0, 3.0), effect=st.booleans())
 def test_energy_relative_to_the_air_never_grows(seed, speed, mass, effect):
-    """For any wind up to 1e6 m/s, any state, light and heavy vertices."""
+    """For winds up to 1e6 m/s, random states, and light and heavy vertices."""
     rng = np.random.default_rng(seed)
     wind = 10.0**speed * rng.uniform(-1.0, 1.0, 3) if effect else np.zeros(3)
     air = (
@@ -98,7 +98,7 @@ def test_the_wind_has_the_value_of_every_keyframe(interpolation, start):
     for key in KEYS:
         expected = posed(taken, key["offset"], key.get("turn", (0, 0, 0)))
         assert run[start + key["at"], held] == pytest.approx(expected, abs=1e-12)
-    # a turn of 450 degrees is one of 90, but the way there is not
+    # a turn by 450 degrees ends as one by 90, but the way there differs
     assert run[-1, held] == pytest.approx(posed(taken, [0, 0, 0.3], [0, 90, 0]), abs=1e-12)
     if interpolation == "linear":
         halfway = posed(taken, [0.05, 0, 0.3], [0, 270, 0])

@@ -1,4 +1,4 @@
-"""Held vertices have infinite mass: no contact moves them in any coordinates; what the log says."""
+"""Fixed vertices have infinite mass: no contact moves them. The log names impossible contacts."""
 
 import logging
 
@@ -13,7 +13,7 @@ from pdrom.reduction.subspace.training import make_columns
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "lift": 1.0}
 BASE = ({"effect": "gravity"}, {"effect": "strain", "weight": 1e4})
 PINS = {"effect": "pins", "select": "bottom", "until": 12}
-# each has the lowest row of the sheet, at y = 0.6, in its inside
+# each contains the lowest row of the sheet, at y = 0.6
 OBSTACLES = {
     "floor": {"effect": "floor", "height": 0.7},
     "plane": {"effect": "plane", "point": [0, 0.7, 0], "normal": [0.1, 1, 0], "friction": 0.5},
@@ -31,7 +31,6 @@ def warnings_of(scene, caplog) -> list[str]:
 
 @pytest.mark.parametrize("name", OBSTACLES)
 def test_pins_inside_an_obstacle_stay_fixed_are_named_and_are_released_at_rest(name, caplog):
-    """In all vertices and in a subspace."""
     scene = make_scene(*BASE, PINS, OBSTACLES[name], mesh=SHEET)
     held, rest = scene.boundaries[0].vertices, scene.mesh.points
     (message,) = warnings_of(scene, caplog)
@@ -53,7 +52,7 @@ def test_pins_inside_an_obstacle_stay_fixed_are_named_and_are_released_at_rest(n
 
 
 def test_a_collision_moves_only_free_vertices(rng):
-    """Close pairs with one held end: the other end gets the whole distance."""
+    """In a close pair with one fixed vertex, the other vertex moves by the complete distance."""
     collision = {"effect": "self_collision", "thickness": 0.3}
     scene = make_scene(*BASE, PINS, collision, mesh=SHEET)
     (contact,), held = scene.contacts, scene.boundaries[0].vertices
@@ -74,7 +73,7 @@ def test_targets_are_named_only_if_something_obstructs_them_later(caplog):
     for effects in (
         [PINS, {**FLOOR, "height": 0.6}],
         [PINS, {**OBSTACLES["plane"], "point": [0, 0.6, 0], "normal": [0, 0.3, 0]}],
-        [{**PINS, "start": 2}, FLOOR],  # pushed out before
+        [{**PINS, "start": 2}, FLOOR],  # vertices that were pushed out before
         [PINS, {"effect": "self_collision", "thickness": 0.3}],
     ):
         assert warnings_of(make_scene(*BASE, *effects, mesh=SHEET), caplog) == []

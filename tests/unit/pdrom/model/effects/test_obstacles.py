@@ -1,4 +1,4 @@
-"""Obstacles: nothing ends inside or passes through, friction is Coulomb's; their drawn surfaces."""
+"""Obstacles: no vertex ends inside or passes through, friction is Coulomb's; drawn surfaces."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def obstacle(name, friction=0.0, **changes):
 
 
 def distance(name, points):
-    """Signed distance to the surface, negative inside, written down independently."""
+    """Signed distance to the surface, negative inside, independent of the implementation."""
     if name == "plane":
         return (points - [0.1, 0.2, 0.3]) @ (np.array([1.0, 2.0, -2.0]) / 3.0)
     if name == "sphere":
@@ -32,7 +32,7 @@ def distance(name, points):
 @pytest.mark.parametrize("name", OBSTACLES)
 @given(seed=SEEDS, size=st.floats(-3, 4), friction=st.sampled_from([0.0, 0.3, np.inf]))
 def test_no_vertex_ends_inside_an_obstacle(name, seed, size, friction):
-    """From anywhere, outside or inside, with paths of any length."""
+    """Paths of any length begin anywhere, outside or inside."""
     rng = np.random.default_rng(seed)
     before = rng.uniform(-1.5, 1.5, (200, 3))
     after = before + 10.0**size * rng.standard_normal((200, 3))
@@ -59,7 +59,7 @@ def test_paths_that_miss_the_obstacle_are_unchanged(name, seed, size):
 @pytest.mark.parametrize("name", OBSTACLES)
 @pytest.mark.parametrize("path", [0.0, 5e-324, 1e-300])
 def test_a_path_of_length_zero_is_no_special_case(name, path):
-    """Inside, outside and on the surface of the box."""
+    """The path lies inside, outside or on the surface of the box."""
     before = np.array([[0.0, 0.0, 0.0], [5.0, 5.0, 5.0], [0.7, 0.0, 0.0], [0.7, 0.6, 0.5]])
     after = before + path
     ended = after.copy()
@@ -72,7 +72,7 @@ def test_a_path_of_length_zero_is_no_special_case(name, path):
 @pytest.mark.parametrize("name", OBSTACLES)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_no_path_passes_through_an_obstacle(name, friction, rng):
-    """Aimed at the middle from outside, ten thousand metres a frame: it stays on its side."""
+    """Aimed at the middle from outside, at ten thousand metres a frame, it stays on its side."""
     middle = np.array([0.1, 0.2, 0.3])
     direction = rng.standard_normal((300, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
@@ -81,7 +81,7 @@ def test_no_path_passes_through_an_obstacle(name, friction, rng):
     ended = middle - 1e4 * (before - middle)
     obstacle(name, friction).correct(ended, before)
     assert (distance(name, ended) >= -1e-8).all()
-    # the body is convex: a plane parts it from where the path begins and ends
+    # the body is convex: a plane separates it from both ends of the path
     assert (distance(name, 0.5 * (ended + before)) >= -1e-8).all()
 
 
@@ -105,7 +105,7 @@ def test_a_plate_without_thickness_stops_vertices_that_fall_on_it():
 
 @pytest.mark.parametrize("mu", [0.0, 0.1, 0.4, 0.6, 10.0, np.inf])
 def test_friction_on_a_slope_follows_coulombs_law(mu):
-    """A point glides down a plane of 30 degrees with g (sin - mu cos), or stays: tan is 0.577."""
+    """A point slides down a plane of 30 degrees with g (sin - mu cos), or stays if mu > 0.577."""
     tilt = np.radians(30.0)
     slope = obstacle("plane", mu, point=[0, 0, 0], normal=[np.sin(tilt), np.cos(tilt), 0])
     down = np.array([np.cos(tilt), -np.sin(tilt), 0.0])

@@ -1,4 +1,4 @@
-"""Self-collision: no pair ends closer than it may, momentum is kept, the rest is left alone."""
+"""Self-collision: no pair ends closer than allowed, momentum is conserved, nothing else moves."""
 
 import logging
 
@@ -25,7 +25,7 @@ def sheet(*effects, thickness=THICKNESS, mesh=SHEET, **settings):
 
 
 def closest(scene, positions):
-    """Least distance over the thickness, of pairs that are farther apart than it at rest."""
+    """Least distance over the thickness, of pairs whose distance at rest exceeds the thickness."""
     apart = pdist(scene.mesh.points) > THICKNESS
     return pdist(positions)[apart].min() / THICKNESS
 
@@ -35,7 +35,7 @@ def closest(scene, positions):
     [{"folded": True}, {"folded": True, "noise": 1e-3}, {"scrambled": 1.0}, {"mapped": [0, 0, 0]}],
 )
 def test_no_pair_ends_closer_than_90_percent_of_the_thickness(start):
-    """A sheet that falls on the floor as a heap: vertices coincide at the start."""
+    """A sheet falls on the floor and folds; vertices coincide at the start."""
     scene = sheet(GRAVITY, {"effect": "floor"})
     loop, state = scene.stepper(), start_of(scene, **start)
     assert closest(scene, state.positions) < 0.5
@@ -46,7 +46,7 @@ def test_no_pair_ends_closer_than_90_percent_of_the_thickness(start):
 
 @given(seed=SEEDS)
 def test_a_collision_keeps_the_centre_of_mass(seed):
-    """The centre of mass of light and heavy vertices stays; each moves by its inverse mass."""
+    """Vertices of different mass move in proportion to their inverse masses."""
     rng = np.random.default_rng(seed)
     scene = sheet(masses=[{"select": "left", "vertex_mass": 500.0}])
     (contact,) = scene.contacts
@@ -60,7 +60,7 @@ def test_a_collision_keeps_the_centre_of_mass(seed):
 
 
 def test_a_pair_that_passed_through_each_other_is_put_back():
-    """Two layers a tenth of the thickness beyond each other end in their old order."""
+    """Two layers that are 10 % of the thickness beyond each other end in their old order."""
     scene = sheet()
     (contact,) = scene.contacts
     before = scene.mesh.points.copy()

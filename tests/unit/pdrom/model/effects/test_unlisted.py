@@ -1,4 +1,4 @@
-"""What a scene does not list costs it nothing, for every effect of the registry."""
+"""An effect that a scene does not list costs no time and no memory."""
 
 import json
 import subprocess
@@ -20,7 +20,7 @@ from study.pipeline.scenes import read_scene
 FRAMES = 12
 SCENES = sorted(path.stem for path in (ROOT / "config" / "scenes").glob("*.yaml"))
 
-# An entry of each effect with which it cannot act in `FRAMES` frames. None: it always acts.
+# An entry of each effect that cannot act within `FRAMES` frames; None if it always acts.
 LATE = {"select": "top", "start": FRAMES}
 FAR = 1e6
 IDLE: dict[str, dict | None] = {
@@ -44,13 +44,13 @@ IDLE: dict[str, dict | None] = {
 
 
 def other_group(effect: str) -> str:
-    """A group to make a scene of that does not list ``effect``."""
+    """A constraint group for a scene that does not list ``effect``."""
     return "spring" if effect != "spring" else "strain"
 
 
 @cache
 def report(group: str) -> dict:
-    """What a scene of one group imports, compiles and holds, in a process of its own."""
+    """Imports, compiled functions and memory of a scene of one group, in a fresh process."""
     effects = [name for name in EFFECTS if other_group(name) == group]
     done = subprocess.run(
         [sys.executable, "holdings_of_scenes.py", group, *effects],
@@ -61,7 +61,7 @@ def report(group: str) -> dict:
 
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_a_scene_neither_imports_an_unlisted_effect_nor_allocates_memory_for_it(effect):
-    """The same compiled functions of its own, arrays and bytes, and the same bits of its run."""
+    """Compiled functions, arrays, bytes and positions are equal before and after it is loaded."""
     group = other_group(effect)
     found = report(group)
     assert EFFECTS[group].partition(":")[0] in found["modules"]
@@ -80,7 +80,7 @@ def test_a_scene_neither_imports_an_unlisted_effect_nor_allocates_memory_for_it(
 
 @pytest.mark.parametrize("effect", [name for name in EFFECTS if IDLE.get(name, {}) is not None])
 def test_an_effect_that_cannot_act_changes_no_bit(effect):
-    """Of a sheet that falls, held on one side, with a start off its rest shape."""
+    """The scene is a sheet that falls, fixed on one side, and starts from a deformed shape."""
     if issubclass(EFFECTS.load(effect), ConstraintGroup):
         check_group(effect)
     else:
@@ -96,7 +96,7 @@ def run_with(*effects):
 
 
 def check_group(effect):
-    """A group always acts; another group's projections have the same bits beside it."""
+    """A group always acts; projections of another group in the same scene keep their bits."""
     if effect not in ("bending", "spring", "strain"):
         mesh, group = GROUPS[effect], "spring"
     else:
@@ -116,7 +116,7 @@ def check_group(effect):
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_scene_depends_only_on_the_code_of_effects_that_it_lists(scene):
-    """Fingerprints of its jobs cover these modules; an edit of another effect reruns nothing."""
+    """An edit of another effect reruns none of its jobs."""
     config = read_scene(ROOT, scene)
     covered = set(closure("study.experiments.fom", *config.modules))
     listed = {EFFECTS[effect.effect].partition(":")[0] for effect in config.effects}
@@ -128,7 +128,7 @@ def test_a_scene_depends_only_on_the_code_of_effects_that_it_lists(scene):
 
 @pytest.mark.parametrize("effect", IDLE)
 def test_a_job_gets_the_configuration_of_the_scene_unchanged(effect):
-    """As plain JSON, with a shape as selection and friction without end where there are any."""
+    """Also with a shape as selection and infinite friction."""
     entry: dict = {"effect": effect, **(IDLE[effect] or {})}
     ball = {"kind": "sphere", "centre": [0, 2, 0], "radius": 0.5}
     if "select" in entry:
