@@ -41,7 +41,7 @@ return all;
 
 
 def evaluate(script: str, file: Path | None = None, **given: Any) -> Any:
-    """Return the value of a script that sees the engine, the unpacked models and the given values."""
+    """Value of a script that sees the engine, the unpacked models and the given values."""
     node = compute_driver_executable()[0]
     scripts = [str(path) for path in SCRIPTS]
     data = {"scripts": scripts, "file": file and str(file), "script": script, **given}

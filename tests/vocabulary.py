@@ -1,4 +1,4 @@
-"""The names that the project has, and which words in code font name nothing of it."""
+"""The names of the project, and words in code font that name nothing of it."""
 
 import re
 from collections.abc import Collection, Iterator
@@ -18,7 +18,7 @@ from study.tables import declared
 from study.verification import command
 from study.verification.subject import options_parser
 
-# Programs of others, whose words and options are theirs.
+# Other programs, with their words and options.
 PROGRAMS = re.compile(
     r"(\.ci/run|apt|b2sum|docker|find|g\+\+|git|head|meshio|nohup|pip|sacct|tail|tmux|uv"
     r"|\./reproduce (test|run pip)|\.venv/bin/(ruff|snakefmt|mypy))\b"
@@ -27,13 +27,13 @@ OTHERS = {
     # of SLURM, Python, pandas, JavaScript, OpenBLAS
     "--qos", "--slurm-status-command", "MinJobAge", "cancelled", "slurm_account",
     "slurm_partition", "multiprocessing", "NaN", "fetch", "tanh", "Node.js", "Zen",
-    # that readers choose, or code puts together
+    # names that readers choose or code composes
     "config/scenes/my_sheet.yaml", "config/mine.yaml", "config/scenes/meshes/sheet.obj", "t.csv",
     "train_frames", "heldout_frames", "pulled.yaml",
 }  # fmt: skip
 WRITTEN = re.compile(r"\.(py|js|smk|tex|ya?ml|toml|sh|css|lock|rst)$|^(config|docs|src|tests)/")
 WORD = re.compile(r"(?<![\w-])--[a-z][\w-]+|(?<![\\\w.-])[.\w{}*-]*[\w}](?:/[.\w{}*-]+)*")
-# A whole span; what stands before a colon, an equals sign or a bracket; an item in brackets.
+# A complete span; the part before a colon, an equals sign or a bracket; an item in brackets.
 NAME = re.compile(
     r"^[A-Za-z_][\w-]+$|(?<![\\\w.-])[A-Za-z_][\w-]+(?=[:=(])"
     r"|(?:(?<=[({,])|(?<=: ))\s*[\w-]+\s*(?=[,)}])"
@@ -49,7 +49,7 @@ def keys(content: dict[str, Any], above: str = "") -> Iterator[str]:
 
 @cache
 def names() -> set[str]:
-    """Options, keys, paths by each end, and words of the code without comments and docstrings."""
+    """Options, keys, endings of paths, and words of the code without comments and docstrings."""
     found = {*OTHERS, *(f"{name}.csv" for name in declared())}
     settings = StudySettings.model_validate(read_yaml(CONFIG / "default.yaml"))
     found |= {*keys(settings.model_dump(by_alias=True))}
@@ -71,14 +71,14 @@ def names() -> set[str]:
 
 @cache
 def resolved(word: str) -> bool:
-    """Whether the word is a module of the project or what one defines."""
+    """Whether the word is a module of the project or a name that a module defines."""
     with suppress(ImportError, AttributeError):
         return word.startswith(("pdrom.", "study.")) and resolve_name(word) is not word
     return False
 
 
 def known(word: str, own: Collection[str] = ()) -> bool:
-    """Whether the project or the page has the name; capitals, braces and letters are any."""
+    """Whether the project or the page has the name; capitals, braces and letters match any text."""
     if word in names() or word in own or re.fullmatch(r"\w\d*(\.\w)?|[\d.].*", word):
         return True
     pattern = re.sub(r"\{\w+\}|(?<![A-Z_])[A-Z]{4,}(?![A-Z_])", "*", word)
@@ -91,7 +91,7 @@ def known(word: str, own: Collection[str] = ()) -> bool:
 
 
 def gone(span: str, own: Collection[str] = ()) -> Iterator[str]:
-    """Words of a span that look like names and are none; ``own``: names that its page defines."""
+    """Words of a span that look like names but do not exist; ``own``: names defined on the page."""
     called = re.match(r"(?:\.venv/bin/|\./reproduce run )?(pdrom [a-z]\S*)", span)
     prefix = f"{called[1]} " if called else ""
     if prefix and prefix not in names():

@@ -1,4 +1,4 @@
-"""Files of models for the page, of small scenes."""
+"""Files of models of small scenes for the page."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ from study.live.page import live_page
 
 
 def write_page(folder: Path, models: list[Path]) -> Path:
-    """The page of some files of models, which lie below its folder."""
+    """Write the page of some files of models, which lie below its folder."""
     out = folder / "live.html"
     scenes = [re.search(r'"scene":"(\w+)"', path.read_text("utf-8")) for path in models]
     files = [
@@ -31,7 +31,7 @@ def write_page(folder: Path, models: list[Path]) -> Path:
 def write_models(
     scene: Scene, folder: Path, every: int = 2, k: int = 3
 ) -> tuple[Path, subspaces.SubspaceModel]:
-    """File of one model of ``k`` modes that samples some of the elements, and the model."""
+    """Write the file of one model of ``k`` modes with sampled elements; return file and model."""
     reference = trajectory(scene, track_objective=False)
     (group,) = scene.groups
     elements = np.arange(0, group.elements, every)

@@ -95,10 +95,7 @@ def _write(path: Path, content: Content) -> None:
 
 
 def load_project(root: Path, overrides: Mapping[str, Any] | None = None) -> Plan:
-    """Plan the study as the workflow does before its first job.
-
-    ``overrides`` stand for ``--config``.
-    """
+    """Plan the study as the workflow does; ``overrides`` stand for ``--config``."""
     check_files([root / STUDY])
     config = {**read_yaml(root / STUDY), **(overrides or {})}
     plan = Plan(Study(config, root))

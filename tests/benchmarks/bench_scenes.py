@@ -158,7 +158,7 @@ def trained(name):
 @pytest.mark.parametrize("kind", RUNS)
 @pytest.mark.parametrize("name", ["bar80", "sheet100_strain", "strain_oop", "spring_oop"])
 def bench_reduced_run(benchmark, name, kind):
-    """Time 40 frames with all positions; report their deformation error against converged frames."""
+    """Time 40 frames with all positions; report the deformation error against converged frames."""
     scene, model = trained(name)
     own, solver, lift = scene.iterated(*RUNS[kind][:2]), RUNS[kind][2], model.reduced.positions
     loop, start = model.loop(own, solver=solver)

@@ -136,7 +136,7 @@ def random_forces(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, f
 
 
 def test_the_bound_of_the_theorem_holds_in_random_scenes_and_is_nearly_reached():
-    """Masses, forces, fixed vertices and projections are random. A mode in resonance comes close."""
+    """Masses, forces, fixed vertices and projections are random; a resonant mode comes close."""
     used: list[float] = []
     for seed in range(2 * SCENES):
         if len(used) == SCENES:
@@ -154,7 +154,7 @@ def test_the_bound_of_the_theorem_holds_in_random_scenes_and_is_nearly_reached()
 
 @pytest.mark.parametrize("tangent", [0.1, 0.3, 3.0])
 def test_a_mode_driven_in_resonance_grows_by_the_closed_formula(tangent):
-    """A force with the sign of the response drives the mode; reference: the recursion of a frame."""
+    """A force with the sign of the response drives a mode; reference: the recursion of a frame."""
     m, angle = np.arange(2000), np.arctan(tangent)
     answer = np.sin(angle) * np.cos(angle) ** m * np.sin((m + 1) * angle)
     x, before = 0.0, 0.0

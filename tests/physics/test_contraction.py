@@ -95,7 +95,7 @@ def test_contraction_is_at_most_deim_constant_times_stiff_share(group, method):
 
 
 def test_two_starts_converge_to_each_other_if_the_contraction_is_below_one():
-    """Two starts that differ by 1e-3 approach each other at the rate of the contraction or faster."""
+    """Two starts that differ by 1e-3 approach each other at the rate of the contraction or more."""
     scene, reduction, positions = _case("spring", METHODS["pod"])
     (group,) = scene.groups
     assert _contraction(scene, reduction, positions[13]) < 1.0

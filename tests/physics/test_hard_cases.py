@@ -93,7 +93,7 @@ def is_free(scene: Scene) -> bool:
 
 
 def keeps_momentum(scene: Scene, positions: np.ndarray, v: np.ndarray) -> bool:
-    """Whether only gravity changes the momentum, up to rounding errors of S^T W p and the solver."""
+    """Whether only gravity changes the momentum, up to rounding errors of S^T W p and solver."""
     h, masses = scene.config.time_step, scene.masses
     pull = sum((f.acceleration(positions[0], v[0]) for f in scene.forces), np.zeros(3))
     found = np.einsum("n,fna->fa", masses, v)

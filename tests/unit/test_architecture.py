@@ -1,4 +1,4 @@
-"""The house: rooms whose imports point one way, no cycles of folders, private names, sizes."""
+"""The architecture: imports between rooms, cycles, private names, sizes."""
 
 import ast
 from collections.abc import Iterator
@@ -40,9 +40,9 @@ def tree(name: str) -> ast.Module:
 
 
 def imports(name: str) -> Iterator[tuple[str, str | None]]:
-    """(module, name in it or None) of every import of a module, inside functions too.
+    """(module, name in it or None) of every import of a module, also inside functions.
 
-    Imports for type checking count as well: a reader follows them, too.
+    Imports for type checking count, too, because a reader follows them.
     """
     for node in ast.walk(tree(name)):
         if isinstance(node, ast.Import):
@@ -89,7 +89,7 @@ def test_imports_between_rooms_point_one_way() -> None:
 
 
 def cycle(edges: dict[str, set[str]]) -> list[str]:
-    """Nodes of a cycle, none where there is none."""
+    """Nodes of a cycle, empty without a cycle."""
     try:
         TopologicalSorter(edges).prepare()
     except CycleError as error:
@@ -101,7 +101,7 @@ def cycle(edges: dict[str, set[str]]) -> list[str]:
 def test_no_module_and_no_folder_imports_itself_through_others() -> None:
     edges = {name: set(own_imports(name)) - {name} for name in MODULES if name not in PACKAGES}
     assert cycle(edges) == []
-    # modules of a folder count as one; a folder may use those inside it, which may use none
+    # modules of a folder count as one; a folder may use folders inside it, but not the reverse
     edges = {}
     for name in MODULES:
         for other in own_imports(name):
@@ -135,7 +135,7 @@ def test_numerics_never_import_plotting() -> None:
 
 
 def test_modules_and_classes_are_not_too_long() -> None:
-    """A longer module says why in its docstring; no class is longer."""
+    """A longer module gives the reason in its docstring; classes have no exception."""
     wrong = []
     for name, path in MODULES.items():
         lines = len(path.read_text(encoding="utf-8").splitlines())

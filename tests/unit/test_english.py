@@ -23,9 +23,7 @@ TERMS = re.compile(
 WORDS = re.compile(rf"\b(?:{'|'.join(REFUSED)})\b", re.IGNORECASE)
 # What no reader sees as prose: code in Markdown, addresses; names, keys and comments in TeX.
 CODE = re.compile(r"```.*?```|`[^`]*`|(?<=\])\([^)]*\)", re.DOTALL)
-KEYS = re.compile(
-    r"(?<!\\)%.*|\\(?:texttt|n|ref|eqref|label|cite|figureof|input|tablefile)\{[^{}]*\}"
-)
+KEYS = re.compile(r"(?<!\\)%.*|\\(?:texttt|n|ref|eqref|label|cite|figureof|input|tablefile)\{[^{}]*\}")
 
 
 def refused(text: str) -> list[str]:

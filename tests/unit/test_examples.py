@@ -1,4 +1,4 @@
-"""The examples of the documentation: they run, are short, and each makes its picture."""
+"""The examples of the documentation run, are short, and make their pictures."""
 
 import matplotlib.image
 import pytest

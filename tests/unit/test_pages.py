@@ -1,4 +1,4 @@
-"""What the pages for readers name is there: links, and paths of the project."""
+"""Pages for readers name existing files, headings, commands and keys."""
 
 import re
 from collections.abc import Iterator
@@ -48,7 +48,7 @@ def test_links_lead_to_files_and_headings_that_exist(page: Path) -> None:
 
 
 def spans(text: str) -> Iterator[str]:
-    """Texts in code font and commands; a key that begins with a dot gets the section before it."""
+    """Texts in code font and commands; a key that begins with a dot follows its section."""
     for block in re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
         yield from (line.partition(" #")[0] for line in block.splitlines())
     for line in re.sub(r"```.*?```", "", text, flags=re.DOTALL).splitlines():
@@ -61,8 +61,8 @@ def spans(text: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("page", NAMED, ids=[str(page.relative_to(ROOT)) for page in NAMED])
 def test_names_in_code_font_exist(page: Path) -> None:
-    """Modules, commands, options, keys, files; those that a recipe of the page defines, too."""
-    text = page.read_text("utf-8").split("\n## 0.")[0]  # of releases only the coming one
+    """Modules, commands, options, keys, files, and names that a recipe of the page defines."""
+    text = page.read_text("utf-8").split("\n## 0.")[0]  # of the releases only the next one
     if page.name == "0018-what-was-given-up.md":
         text = re.sub(r"^\| [^|]* \|", "|", text, flags=re.MULTILINE)
     recipes = re.findall(r"```(?:python|yaml|tex)\n(.*?)```", text, re.DOTALL)

@@ -1,4 +1,4 @@
-"""What git tracks: text and a few pictures, nothing large or binary by accident; the container."""
+"""Git tracks text and a few pictures, no large or other binary file; files for containers."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from study.pipeline.folders import Folders
 from study.tables import declared
 
 LARGEST = 300_000
-# Binary files that are meant: pictures of the pages for readers, compressed tables.
+# Intended binary files: pictures of the pages for readers, compressed tables.
 BINARY = (
     "docs/*.png", "docs/examples/*.png", "results/reference/tables/*.xz",
     "results/reference/studies/*/tables/*.xz",
@@ -37,7 +37,7 @@ def test_the_manifest_for_codecheckers_follows_version_2_and_names_what_the_stud
     assert path.read_text("utf-8").startswith("---\n")
     content = read_yaml(path)
     assert content["version"] == "https://codecheck.org.uk/spec/config/2.0/"
-    # the codechecker fills them in
+    # the codechecker fills in these entries
     assert {"codechecker", "report", "summary", "certificate"} <= set(content)
     made = {TABLE.at(RESULTS, name=name) for name in declared()}
     made |= {FIGURE.at(RESULTS, name=name) for name in declarations()}

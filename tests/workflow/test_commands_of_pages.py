@@ -1,4 +1,4 @@
-"""Commands of pages and configurations are executed: as they are, by -n, or left out by name."""
+"""Commands of pages and configurations are executed, planned with -n, or left out by name."""
 
 import re
 import shlex
@@ -19,9 +19,9 @@ BLOCK = re.compile(r"^```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)
 # In the comments of a configuration.
 ABOVE = re.compile(r"^#   (\./reproduce .*)", re.MULTILINE)
 INLINE = re.compile(r"`((?:\./reproduce|\.venv/bin/\w+) [^`]+)`")
-COMMENT = re.compile(r"\s+#.*|\s*&&.*")  # of what && joins, the first one
+COMMENT = re.compile(r"\s+#.*|\s*&&.*")  # the first of the commands that && joins
 
-# What cannot be executed here, and why.
+# Commands that cannot be executed here, and the reasons.
 LEFT_OUT = {
     r"--executor|executor-plugin|workflow/profiles|sinfo|sbatch": "needs a cluster: tests/machines",
     r"[A-Z]{4}": "words in capitals stand for others",
@@ -37,7 +37,7 @@ LEFT_OUT = {
 
 
 def commands(start: str) -> list[str]:
-    """Commands of all pages that begin so, without those that are left out."""
+    """Commands of all pages with this beginning, without those that are left out."""
     found: dict[str, None] = {}
     for page in [*PAGES, *sorted((ROOT / "config").glob("*.yaml"))]:
         text = page.read_text(encoding="utf-8").replace("\\\n", " ")
@@ -99,7 +99,7 @@ def test_the_command_line_works_in_the_order_of_its_page(tmp_path, checkout):
     shown = commands("pdrom ")
     assert len(shown) > 4
     for words in (("new", "pulled.yaml", "--mesh", "sheet.obj"), ("run", "pulled.yaml")):
-        run(checkout, "pdrom", *words, cwd=tmp_path)  # the scene that the page's reader has written
+        run(checkout, "pdrom", *words, cwd=tmp_path)  # the scene that the reader has written
     for command in shown:
         run(checkout, "pdrom", *shlex.split(command)[1:], cwd=tmp_path)
 

@@ -1,8 +1,8 @@
-"""Faults lose nothing: after a plain rerun the results are those of an undisturbed run.
+"""After a fault, a plain rerun gives the results of an undisturbed run.
 
-The real ``./reproduce`` runs a very small study in a folder of its own; processes are killed, disks
-fill up, files are damaged. What a clock measured is not compared (`Sandbox.results`).
-The long ones are marked slow: ``./reproduce test -m slow``.
+The real ``./reproduce`` runs a very small study in a separate folder, while processes are killed,
+disks fill up and files are damaged. Measured times are not compared (`Sandbox.results`).
+The long tests are marked slow: ``./reproduce test -m slow``.
 """
 
 import os
@@ -53,14 +53,14 @@ def last_lines(output: str, count: int = 2) -> str:
 
 
 def heals(sandbox: Sandbox, undisturbed: Sandbox, target: str = TABLE) -> None:
-    """A plain rerun ends with the results of an undisturbed one, and no temporary file is left."""
+    """Check that a rerun gives the results of an undisturbed run and leaves no temporary file."""
     sandbox.finish(target)
     assert sandbox.results() == undisturbed.results()
     assert not sandbox.temporaries()
 
 
 def test_lost_rows_and_a_killed_job_are_named_and_made_again(undisturbed, sandbox):
-    """A file is damaged after the plan, by the next run the last job is killed."""
+    """The first run finds a file that was damaged after the plan; the next loses its last job."""
     sandbox.path(BASIS).unlink()
     waiting = "/\\.none-affine-vectorised\\.[0-9a-f]{16}"
     process = sandbox.start("--", TABLE, fault=f"hold:{waiting}")
@@ -81,7 +81,7 @@ def test_lost_rows_and_a_killed_job_are_named_and_made_again(undisturbed, sandbo
 
 @slow
 def test_a_run_that_was_killed_with_all_its_jobs_is_completed_by_the_next_run(undisturbed, fresh):
-    """Half-written files and the locks of both programs are left, and nobody unlocks by hand."""
+    """Half-written files and the locks of both programs remain, and no user unlocks by hand."""
     for folder in ("fom", "snapshots", "pod", "reruns"):
         kill_all(_caught_writing(fresh, folder))
         assert list(fresh.path(".snakemake/locks").iterdir())
@@ -91,7 +91,7 @@ def test_a_run_that_was_killed_with_all_its_jobs_is_completed_by_the_next_run(un
 def _caught_writing(
     sandbox: Sandbox, folder: str, kind: str = "slow", *targets: str
 ) -> subprocess.Popen[str]:
-    """A run one of whose jobs is at a file of ``folder``, kept there as ``kind`` says."""
+    """A run with a job that writes a file of ``folder`` and is stopped there as ``kind`` says."""
     process = sandbox.start(*targets or ("--", TABLE), fault=f"{kind}:/{MICRO_RESULTS}/{folder}/")
     place = sandbox.path(MICRO_RESULTS) / folder
     wait_for(lambda: any(place in p.parents for p in sandbox.temporaries()), process)
@@ -104,7 +104,7 @@ def _caught_writing(
     [
         (os.killpg, signal.SIGINT, "slow"),
         (os.killpg, signal.SIGHUP, "hold"),
-        (os.kill, signal.SIGTERM, "hold"),  # one of its jobs would never end by itself
+        (os.kill, signal.SIGTERM, "hold"),  # one of its jobs would never end without a signal
     ],
     ids=["interrupted", "SIGHUP to all", "SIGTERM to the run alone"],
 )
@@ -140,24 +140,24 @@ def test_a_run_on_a_full_disk_fails_and_is_completed_by_the_next_run(undisturbed
 
 
 def cut(path: Path) -> None:
-    """Cut the end off and keep the times: what a bad disk does."""
+    """Cut off the end and keep the times, as a bad disk does."""
     before, content = path.stat(), path.read_bytes()
     path.write_bytes(content[: len(content) * 6 // 10])
     os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
 
 
 def lose_the_checksum(path: Path) -> None:
-    """As a copy of the file alone, or a job that was killed at the wrong moment."""
+    """Remove the checksum, as by copying only the file, or killing a job between both files."""
     checksum_path(path).unlink()
 
 
 def copy_of_training(path: Path) -> None:
-    """The file of another motion with its dates and its checksum."""
+    """The file of another trajectory with its dates and its checksum."""
     shutil.copy2(path.with_name("train.h5"), path)
 
 
 def test_damaged_results_are_named_by_the_plan_and_made_again(undisturbed, sandbox):
-    """Several at once, though all that is made from them is there and younger."""
+    """Several results at once, although all files that are made from them exist and are newer."""
     other = f"{MICRO_RESULTS}/fom/spring_oop/heldout.h5"
     damages = {other: copy_of_training, SNAPSHOTS: Path.unlink, BASIS: cut}
     damages |= {f"{SAMPLING}.csv": lose_the_checksum, f"{SAMPLING}.h5": Path.unlink}
@@ -172,7 +172,7 @@ def test_damaged_results_are_named_by_the_plan_and_made_again(undisturbed, sandb
 
 
 def run_while_all_code_is_edited(sandbox: Sandbox, *targets: str) -> None:
-    """Let every module fail after the first job has started; undo this when the run is over."""
+    """Make every module fail after the first job has started; undo this after the run."""
     process = _caught_writing(sandbox, "meshes", "hold", "--cores", "1", "--", *targets)
     sources = {path: path.read_text() for path in sandbox.path("src").rglob("*.py")}
     for path, text in sources.items():
@@ -186,7 +186,7 @@ def run_while_all_code_is_edited(sandbox: Sandbox, *targets: str) -> None:
 
 
 def test_a_job_ignores_edits_of_the_code_during_the_run(fresh):
-    """Every job but the first one that makes a mesh; there is no compiled code in them."""
+    """This holds for every job except the first one, which makes a mesh."""
     fresh.use_its_own_package()
     _, planned = fresh.snakemake("-n", "--verbose")
     meshes = set(re.findall(rf"{MICRO_RESULTS}/meshes/\w+.h5", planned))
@@ -199,7 +199,7 @@ MESH = "config/scenes/sheet.obj"
 
 @pytest.mark.parametrize("name", [MESH, "workflow/scripts/artifact.py"])
 def test_a_file_that_is_edited_while_a_job_reads_it_is_refused(name, fresh):
-    """Though the edit is undone before the job ends; the next run makes the result again."""
+    """Even if the edit is undone before the job ends; the next run makes the result again."""
     _read_mesh(fresh)
     process = _caught_writing(fresh, "meshes", "hold", "--", RUN)
     text = fresh.path(name).read_text()
@@ -223,7 +223,7 @@ def _read_mesh(sandbox: Sandbox, wave: float = 0.0) -> None:
 
 @slow
 def test_a_changed_mesh_file_reruns_the_jobs_that_depend_on_it(tmp_path):
-    """Though the new file is older than the results, as after unpacking an archive."""
+    """Even if the new file is older than the results, as after unpacking an archive."""
     first, second = (Sandbox.make(tmp_path / name) for name in ("first", "second"))
     for sandbox, wave in ((first, 0.0), (second, 0.1)):
         _read_mesh(sandbox, wave)

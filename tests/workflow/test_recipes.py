@@ -1,7 +1,7 @@
-"""Each recipe of CONTRIBUTING.md is typed into a copy, and the pipeline makes what it adds.
+"""Each recipe of CONTRIBUTING.md is added to a copy, and the pipeline makes its files.
 
-A block of code below a line "`path`:" is a new file; one below "`path`, below `line`:" is added
-to a file that exists, under the line that reads so, indented as that is.
+A block of code below a line "`path`:" is a new file. A block below "`path`, below `line`:" is added
+to an existing file under that line, with its indentation.
 """
 
 import re
@@ -26,7 +26,7 @@ BLOCK = re.compile(
 
 @dataclass(frozen=True)
 class Block:
-    """Code that belongs into a file, below a line of it or as the whole."""
+    """A block of code that is added below a line of a file or is the complete file."""
 
     path: str
     below: str | None
@@ -77,7 +77,7 @@ GROUP_TESTS = ("tests/physics", f"{MODEL}/constraints", f"{MODEL}/dynamics")
 
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
-    """A copy with everything that the recipes add, and a study that uses it."""
+    """A copy with all additions of the recipes, and a study that uses them."""
     made = copy_repository(tmp_path_factory.mktemp("recipes"))
     compiled = shutil.ignore_patterns("__pycache__")
     shutil.copytree(ROOT / "tests", made.folder / "tests", ignore=compiled)
@@ -116,7 +116,7 @@ MADE = (
 
 @pytest.fixture(scope="module")
 def said(checkout: Checkout) -> str:
-    """What a run said that made what the recipes add."""
+    """Output of a run that made the files of the recipes."""
     done = checkout.snakemake(*ARGUMENTS, "--", *(f"{RESULTS}/{name}" for name in MADE))
     assert done.returncode == 0, done.stderr
     return done.stdout + done.stderr
@@ -148,7 +148,7 @@ def test_the_added_code_makes_its_files(checkout, said):
 
 @pytest.mark.slow
 def test_the_added_group_has_the_properties_of_every_group(checkout):
-    """The copy's own tests of groups, on the group that its list of groups names now."""
+    """The copy's tests of groups run on the group that its list of groups names now."""
     program = ("-m", "pytest", "-p", "no:cacheprovider", "-k", "cable")
     done = checkout.looks(*GROUP_TESTS, program=program)
     assert done.returncode == 0, done.stdout

@@ -1,4 +1,4 @@
-"""The report of a run opens in a real browser, without a network: every figure and table."""
+"""The report of a run opens in a real browser without a network, with all figures and tables."""
 
 from collections.abc import Iterator
 
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    """A report whose figures differ by their width; what the page said and asked for is noted."""
+    """A report whose figures have different widths, with the messages and requests of its page."""
     browser_or_skip()
     checkout = copy_repository(tmp_path_factory.mktemp("report"))
     (checkout.folder / MICRO_FILE).write_text(yaml.safe_dump(MICRO), encoding="utf-8")
@@ -37,7 +37,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
 
 
 def go_to(page: Page, entry: str) -> None:
-    """Open a category, from whatever is open."""
+    """Open a category from any page of the report."""
     page.reload()
     page.get_by_role("link", name=entry, exact=True).click()
 
@@ -54,12 +54,12 @@ def test_every_figure_of_the_report_opens(opened):
 
 
 def test_the_report_opens_without_a_network_and_without_an_error(opened):
-    """Tables have their titles, statistics are drawn."""
+    """Tables have their titles, and statistics are drawn."""
     go_to(opened, "Tables")
     text = opened.inner_text("body")
     assert [t.name for t in declared().values() if t.title not in text] == []
     go_to(opened, "Statistics")
     opened.locator("svg, canvas").last.wait_for()
     assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
-    # Snakemake inlines a script that asks for another way to build it
+    # Snakemake includes a script that prints advice on building it
     assert [said for said in opened.said if "tailwindcss" not in str(said)] == []

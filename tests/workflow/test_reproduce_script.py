@@ -1,4 +1,4 @@
-"""The script ``reproduce``: clear failures, one set-up at a time, arguments handed on."""
+"""The script ``reproduce``: clear errors, one set-up at a time, arguments are passed on."""
 
 import os
 import re
@@ -23,7 +23,7 @@ PACKAGES = "lib/python3.12/site-packages"
 FRONT = "python -m study.pipeline.front"
 LOCK_FILE = f"nowhere==1.0 --hash=sha256:{64 * '0'}\n"
 
-# Stands for a Python of a given version that makes environments out of itself.
+# Replaces a Python of a given version that makes environments.
 PYTHON = """#!/bin/sh
 case "$*" in
 *print*version_info*) echo {version} ;;
@@ -53,7 +53,7 @@ esac
 
 
 class Folder:
-    """A folder with the script, and the programs that it may find."""
+    """A folder with the script, and the programs that it can find."""
 
     def __init__(self, path: Path) -> None:
         self.path = path / "a folder"
@@ -75,7 +75,7 @@ class Folder:
         self.python.chmod(0o755)
 
     def start(self, *arguments: str, new: bool = False, **environment: str) -> subprocess.Popen:
-        """Start the script from another working directory, maybe in a new session."""
+        """Start the script from another working directory, on request in a new session."""
         return subprocess.Popen(
             [self.path / "reproduce", *arguments],
             cwd="/", env={"PATH": str(self.programs), "HOME": str(self.path), **environment},
@@ -96,7 +96,7 @@ class Folder:
         return errors
 
     def works(self) -> None:
-        """A run that makes the environment, and ends in the front of the pipeline."""
+        """A run that makes the environment and starts the pipeline."""
         assert self.run()[0] == 0
         assert self.calls == [FRONT]
 
@@ -108,14 +108,14 @@ class Folder:
 
     @property
     def calls(self) -> list[str]:
-        """Programs that the script ended in, with their arguments."""
+        """Programs that the script finally started, with their arguments."""
         path = self.path / "calls"
         return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Folder:
-    """A folder with a Python that fits."""
+    """A folder with a suitable Python."""
     made = Folder(tmp_path)
     made.add_python()
     return made
@@ -187,13 +187,13 @@ def test_the_environment_is_made_once_for_each_lock_file(folder):
     folder.touch("requirements.lock", "")
     making.append(any("making .venv" in line for line in folder.run()[1]))
     assert making == [True, False, True]
-    # no number of a process stays that a later set-up would kill
+    # no process ID remains that a later set-up would kill
     assert not folder.has(".cache/pip.pid")
 
 
 @pytest.mark.parametrize("change", ["a version", "one more"])
 def test_packages_that_another_program_changed_are_noticed(change, folder):
-    """Those of the executor for clusters and the tests' tools may be added."""
+    """The packages for clusters and the tools of the tests may be added."""
     folder.run()
     packages = folder.path / ".venv" / PACKAGES
     installed = packages / "numpy-2.1.0.dist-info"
@@ -212,7 +212,7 @@ def test_packages_that_another_program_changed_are_noticed(change, folder):
 
 
 def test_only_the_tests_add_their_tools_and_only_where_one_is_missing(folder):
-    """Tools that cannot be added leave the environment of the study as it is."""
+    """If tools cannot be added, the environment of the study stays unchanged."""
     folder.run()
     folder.touch("pip-fails", "ERROR: no\n")
     assert folder.run("test")[0] != 0
@@ -226,7 +226,7 @@ def test_only_the_tests_add_their_tools_and_only_where_one_is_missing(folder):
 
 
 def test_arguments_are_passed_to_the_pipeline(folder):
-    """The set-up shows that it is alive."""
+    """The set-up shows that it is still at work."""
     asked = (["-n", "results/figures/a b.pdf"], ["test", "-q", "tests/unit"], ["run", "true"], [])
     said = [folder.run(*arguments)[1] for arguments in asked]
     assert folder.calls == [" ".join([FRONT, *arguments]) for arguments in asked]
@@ -237,7 +237,7 @@ def test_arguments_are_passed_to_the_pipeline(folder):
 
 @pytest.fixture
 def installing(folder: Folder) -> Iterator[tuple[Folder, subprocess.Popen[str]]]:
-    """A set-up that stays at work."""
+    """A set-up that does not finish."""
     folder.touch("hold")
     process = folder.start(new=True)
     limit = time.monotonic() + 60
@@ -263,7 +263,7 @@ def test_a_second_set_up_ends_at_once_while_the_first_is_at_work(installing):
     ("whole", "number"), [(True, signal.SIGINT), (True, signal.SIGHUP), (False, signal.SIGTERM)]
 )
 def test_a_set_up_that_is_ended_by_a_signal_says_so(installing, whole, number):
-    """It does not wait for the packages, which are no longer installed: the streams close."""
+    """It does not wait for packages, whose installation has stopped: the streams close."""
     folder, first = installing
     (os.killpg if whole else os.kill)(first.pid, number)
     _, errors = first.communicate(timeout=60)

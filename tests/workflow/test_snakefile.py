@@ -1,6 +1,6 @@
 """Plans of the workflow: from nothing, for one figure, after edits, with faults.
 
-A start of Snakemake takes seconds, so that each plan is asked several questions.
+A start of Snakemake takes seconds, so that each plan answers several questions.
 """
 
 import os
@@ -27,7 +27,7 @@ MICRO = sandbox.MICRO | {
 }
 # Folders of results that belong to no single scene.
 SHARED = ("tables", "figures", "paper", "article", "hard_cases", "frame_times")
-KINDS = ("pdf", "png")  # of a figure, for pages and for the report
+KINDS = ("pdf", "png")  # files of a figure, for pages and for the report
 EDITED = ("workflow", "config", "paper", "src", "Snakefile", MICRO_FILE)
 DAY_NS = 86_400 * 10**9
 MICRO_ARGUMENTS = ("--configfile", MICRO_FILE)
@@ -55,14 +55,14 @@ def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
 
 @pytest.fixture(scope="module")
 def plan(finished_once: Checkout) -> dict[str, Made]:
-    """Files of the finished study and what they were made from, before any edit."""
+    """Files of the finished study and their inputs, before any edit."""
     rows = finished_once.summary(*MICRO_ARGUMENTS, "--", *TARGETS)
     assert {row.plan for row in rows} == {"no update"}, "nothing to be done"
     return {row.file: row for row in rows}
 
 
 def needed(plan: dict[str, Made], *targets: str) -> set[str]:
-    """Files that have to be made before the targets are there, theirs included."""
+    """Files that must be made for the targets, with the targets."""
     found: set[str] = set()
     waiting = list(targets)
     while waiting:
@@ -75,7 +75,7 @@ def needed(plan: dict[str, Made], *targets: str) -> set[str]:
 
 @pytest.fixture
 def finished(finished_once: Checkout, plan: dict[str, Made]) -> Iterator[Checkout]:
-    """The finished copy; edits, new files and dates of the test are taken back."""
+    """The finished copy; edits, new files and dates of a test are undone."""
     parts = (*EDITED, "results")
     before = {p: (p.read_bytes(), p.stat()) for p in finished_once.files(*parts)}
     yield finished_once
@@ -88,7 +88,7 @@ def finished(finished_once: Checkout, plan: dict[str, Made]) -> Iterator[Checkou
 
 
 def test_a_fresh_clone_plans_the_complete_study_during_a_run_and_starts_none(clean, monkeypatch):
-    """Tables and figures, and the manuscript in the end. This process holds the lock."""
+    """It plans tables, figures and finally the manuscript. This process holds the lock."""
     monkeypatch.chdir(clean.folder)
     descriptor = hold()
     done = clean.snakemake("-n")
@@ -109,7 +109,7 @@ def test_a_fresh_clone_plans_the_complete_study_during_a_run_and_starts_none(cle
 
 
 def test_one_figure_needs_only_its_inputs(clean):
-    """No table of the whole study, and of the scenes only the two that it draws."""
+    """It needs no table of the complete study, and only the two scenes that it draws."""
     figure = "results/figures/spring_runs.pdf"
     planned = clean.planned(figure)
     assert {p for p in planned if _stage(p) == "figures"} == {figure, figure[:-3] + "png"}
@@ -167,7 +167,7 @@ TEMPLATE = "__use_yte__: templates are not allowed"
 def test_a_broken_file_ends_the_command_with_one_line(finished, path, own, words):
     """A file that Snakemake reads, one that the plan reads, those that ``./reproduce`` checks.
 
-    All other faults: `bad_input.test_bad_input`, without a process.
+    `bad_input.test_bad_input` tests all other faults without a process.
     """
     if path != "none.yaml":
         with open(finished.folder / path, "a", encoding="utf-8") as file:
@@ -183,9 +183,9 @@ ENTRY = '    {\n        "fall": "pdrom.model.effects.forces:Gravity",\n'
 
 
 def test_changed_texts_and_dates_rerun_no_job(finished):
-    """Nor does another number of cores, a new name of an effect, or one that no scene lists.
+    """Neither does another number of cores, a new name of an effect, or one that no scene lists.
 
-    All sources are younger than the results, then all results are younger than now.
+    All sources are newer than the results; then all results are newer than the current time.
     """
     finished.edit(SPRING, '"""Edge springs:', '"""Springs along edges:')
     finished.edit(SPRING, "    # edges are scaled, so that ", "    # edges are divided, so that ")
@@ -202,7 +202,7 @@ def test_changed_texts_and_dates_rerun_no_job(finished):
 
 
 def replanned(checkout: Checkout, *edit: str) -> set[str]:
-    """What is made again after an edit: file, old text, new text."""
+    """Files that are made again after an edit: file, old text, new text."""
     checkout.edit(*edit)
     return checkout.planned(*MICRO_ARGUMENTS)
 

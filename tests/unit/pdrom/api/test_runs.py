@@ -29,7 +29,7 @@ def test_a_uniform_velocity_gives_the_closed_formula_of_free_flight():
 
 @pytest.mark.parametrize("group", ["spring", "strain", "bending", "deformation_gradient"])
 def test_a_continued_run_equals_the_uninterrupted_run_bit_for_bit(group, tmp_path):
-    """With vertices fixed across the break, contacts and forces; the run is also read from a file."""
+    """With vertices fixed across the break, contacts and forces; also from the file of a run."""
     effects = GRAVITY, VELOCITY, HANDLE, ENDING, BALL, {"effect": group, "weight": 1e4}
     keys = {"mesh": GROUPS[group], "anderson_window": 3 * (group == "spring")}
     whole = api.run(scene(*effects, **keys), tmp_path / "whole.h5")

@@ -1,4 +1,4 @@
-"""A scene on a coarser mesh: mass, motions, selections, refusals, and the error of a mesh."""
+"""A scene on a coarser mesh: mass, prescribed motions, selections, errors, and the mesh error."""
 
 from dataclasses import replace
 
@@ -89,7 +89,7 @@ def test_a_mesh_that_is_not_coarser_is_refused(mesh, fault):
 
 @pytest.mark.parametrize("order", [0.6, 2.9, 0.3, 3.5, -1.0, None])
 def test_the_estimated_mesh_error_is_exact_for_powers_of_the_spacing(order, rng):
-    """Of orders .5 to 3; others, and a body at rest, tell none."""
+    """Orders .5 to 3 give an estimate; other orders, and a body at rest, give none."""
     moves, error = rng.standard_normal((2, 4, 10, 3))
     moves[0] = error[0] = 0.0
     spacings = [0.1, 0.17, 0.4]

@@ -1,4 +1,4 @@
-"""The limit K -> infinity: L-BFGS against very many iterations."""
+"""Converged frames (K -> infinity): L-BFGS against very many iterations."""
 
 from dataclasses import replace
 
@@ -49,13 +49,13 @@ def test_a_converged_frame_equals_very_many_iterations(group, rng):
 
 
 class WithoutKernel:
-    """A group whose local step is Python."""
+    """A group whose local step is Python code."""
 
     def __init__(self, group) -> None:
         self.name, self._group = group.name, group
 
     def begin_frame(self, q: np.ndarray) -> None:
-        """Nothing is frozen."""
+        """Freeze nothing."""
 
     def accumulate(self, y: np.ndarray, rhs: np.ndarray) -> float:
         return self._group.accumulate(y, rhs)

@@ -1,4 +1,4 @@
-"""Deformation error: rigid motions are no error, a rigid body has error one, mass counts."""
+"""Deformation error: zero for rigid motions, one for a rigid body, weighted by mass."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_a_rigid_motion_of_the_reference_is_no_error_and_a_rigid_body_has_error_
 
 
 def test_the_best_rotation_is_no_worse_than_any_other(bent, rng):
-    """Against the smallest of many rotations near the best one, with masses in every sum."""
+    """Reference: the smallest error of many rotations near the best one, with all masses."""
     rest, shapes, masses = bent
     shape = shapes[:1]
     (found,) = shape_differences(rest, shape, masses)

@@ -1,4 +1,4 @@
-"""Energy of a run against mechanics: free fall, stretched springs; errors and norms of tables."""
+"""Energy of a run against mechanics (free fall, stretched springs); errors and norms of tables."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SPRING = {"effect": "spring", "weight": 1e4}
 
 
 def test_the_full_order_run_has_energy_ratio_one(group_scene):
-    """Whatever the group, and whether or not the initial state or a later one has the most."""
+    """For every group, for a maximum in the initial or a later state."""
     scene = with_effects(group_scene, GRAVITY)
     run = trajectory(scene)
     assert largest(EnergyScale.of(scene, run).relative(run)) == 1.0
@@ -70,7 +70,7 @@ def test_relative_errors_agree_with_norms_of_matrices_and_have_no_unit(seed, uni
     [
         ([1.0, 1.0, 0.0], 1e-10, [0.1, 0.1, 0.1, None]),
         ([1.0, 1.0, 1e-12], 1e-10, [0.1, 0.1, 0.1, None]),
-        # without a level the largest axis tells
+        # without a level the largest axis sets the scale
         ([1.0, 1.0, 1e-17], 0.0, [0.1, 0.1, 0.1, None]),
         (1e-14, 1e-20, [0.1] * 4),
         (1e-14, 1e-12, [None] * 4),
@@ -85,6 +85,6 @@ def test_a_group_of_rounding_errors_has_no_relative_error(rng, size, level, expe
 def test_the_trajectory_error_weighs_frames_by_their_displacement():
     assert trajectory_error(np.array([3.0, 4.0]), np.array([6.0, 8.0])) == 0.5
     assert trajectory_error(np.zeros(3), np.ones(3)) == 0.0
-    # a run at rest has none
+    # a run at rest has no error
     for frames in (0, 3):
         assert trajectory_error(np.ones(frames), np.zeros(frames)) is None

@@ -1,4 +1,4 @@
-"""Held-out motions of every scene by one rule: each differs, none is another scene."""
+"""One rule gives every scene its test trajectories, which differ from all other trajectories."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ SCENES = [path.stem for path in sorted((ROOT / "config" / "scenes").glob("*.yaml
 
 
 def changed(scene, motion):
-    """Kinds of effects that a motion adds or changes."""
+    """Kinds of effects that a trajectory adds or changes."""
     own = scene.effects
     return {effect.effect for effect in scene.heldout_variant(motion).effects if effect not in own}
 
@@ -67,7 +67,7 @@ def test_gravity_of_a_test_trajectory_keeps_its_size_and_turns_towards_an_axis(o
     assert turned @ own == pytest.approx(size**2 * np.cos(np.radians(degrees)))
     axis = [a for a in (0, 1) if abs(own[a]) < size][place]
     assert (turned[axis] - own[axis]) * degrees > 0.0
-    if own[2] == 0.0:  # a motion in a plane stays in it
+    if own[2] == 0.0:  # a trajectory in a plane stays in it
         assert turned[2] == 0.0
 
 
@@ -87,7 +87,7 @@ def test_pins_that_share_vertices_are_carried_only_if_they_start_together():
     "name", ["spring_oop", "bar_twist", "bend_fall", "cloth_all", "starfish_twist"]
 )
 def test_further_training_trajectories_are_no_test_trajectories_and_can_be_built(name):
-    """Schedules that follow each other still do: no vertex is held in two places."""
+    """Consecutive schedules stay consecutive: no vertex is fixed in two places."""
     scene = read_scene(ROOT, name)
     made = [scene.training_variant(seed) for seed in range(1, 5)]
     variants = [scene, *map(scene.heldout_variant, MOTIONS), *made]

@@ -25,14 +25,14 @@ def mesh(request: pytest.FixtureRequest, rng: np.random.Generator) -> Mesh:
 
 def distance(corners: np.ndarray, point: np.ndarray) -> float:
     """Distance of a point from a simplex, by least squares with non-negative shares."""
-    whole = np.vstack([corners.T, np.full(len(corners), 1e5)])  # the shares' sum is one
+    whole = np.vstack([corners.T, np.full(len(corners), 1e5)])  # the sum of the shares is one
     return float(np.linalg.norm(nnls(whole, np.append(point, 1e5))[0] @ corners - point))
 
 
 def test_a_point_inside_has_affine_values_and_one_outside_those_of_the_nearest_point(
     mesh, rng, monkeypatch
 ):
-    for name, few in (("PAIRS", 500), ("FIRST", 1)):  # the search goes on, in parts
+    for name, few in (("PAIRS", 500), ("FIRST", 1)):  # the search continues in parts
         monkeypatch.setattr(coarser, name, few)
     cells = mesh.tetrahedra if len(mesh.tetrahedra) else mesh.triangles
     shares = rng.dirichlet(np.ones(cells.shape[1]), len(cells))

@@ -1,6 +1,6 @@
-"""Runs of one scene that overlap in time: each is the run alone, to the bit, for every effect.
+"""Runs of one scene that overlap in time equal separate runs bit for bit, for every effect.
 
-No test depends on a race: where runs share memory, one changes another's while that stands still.
+No test depends on a race: if runs share memory, one run changes that of a run that waits.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -23,7 +23,7 @@ from pdrom.reduction.subspace.training import make_columns
 FRAMES, LAG = 10, 6
 SAMPLED = HrpdSpec(dimension=6, samples=20)
 LATE = {"select": [0, 1, 2], "start": 3}
-# An entry of each effect with which it acts in these frames.
+# An entry of each effect that acts in these frames.
 ACTING: dict[str, dict] = {
     "gravity": {"acceleration": [0, -3, 1]}, "damping": {"rate": 1}, "drag": {"coefficient": 1},
     "wind": {"velocity": [0, 5, 5]}, "floor": {"height": 1.9}, "plane": {"point": [0, 1.9, 0]},
@@ -44,7 +44,7 @@ def scene_with(effect):
 
 
 def loops_of(scene, kind):
-    """Function that makes a step loop and its start; its loops share all that runs may share."""
+    """Function that makes a step loop and its initial state; loops share as much as runs may."""
     if kind in ("supernodal", "splu"):
         own, system = scene.iterated(5, 3), scene.system_with(kind)
         return lambda: (own.stepper(system), own.initial_state())
@@ -65,7 +65,7 @@ def loops_of(scene, kind):
 @pytest.mark.parametrize("kind", ["supernodal", "splu", "reduced", "subspace", "interpolated"])
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_a_run_writes_neither_to_its_scene_nor_to_another_run(effect, kind):
-    """Two runs take turns, one a few frames behind, which gets a new loop for every frame."""
+    """Two runs take turns. One is a few frames behind and gets a new loop for every frame."""
     if kind in ("subspace", "interpolated") and not EFFECTS.load(effect).in_subspace:
         pytest.skip("needs all vertices")
     scene = scene_with(effect)

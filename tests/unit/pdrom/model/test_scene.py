@@ -1,7 +1,7 @@
-"""Scenes: what is listed is built, what is not is not; faults have one clear message.
+"""Scenes contain exactly the listed effects; each fault has one clear message.
 
-Masses are one for all, by selection, or by density; runs obey them. Weights by selection are those
-of the elements inside, in energies, systems and runs.
+Masses are equal, by selection, or by density, and runs use them. Weights by selection apply to the
+elements inside, in energies, systems and runs.
 """
 
 import numpy as np
@@ -30,7 +30,7 @@ def test_unlisted_groups_leave_no_matrix_entry():
 
 
 def test_only_needed_snapshots_are_stored_as_projections_of_the_last_iterate(tmp_path):
-    """Replay the frames and project at the last local iterate."""
+    """Reference: the frames are computed again and projected at the last local iterate."""
     scene = make_scene(GRAVITY, TOP, SPRING, {"effect": "strain", "weight": 1e5}, frames=5)
     run(scene, tmp_path / "run.h5", {"strain": np.array([0, 3])})
     seen, strain = [], scene.group("strain")
@@ -79,7 +79,7 @@ def test_later_entries_change_the_vertices_that_they_select():
     ],
 )
 def test_a_density_gives_masses_by_area_or_volume_of_the_rest_shape(effect, mesh):
-    """Total mass is density times area or volume; vertices inside have more than corners."""
+    """Total mass is density times area or volume; inner vertices have more mass than corners."""
     scene = make_scene({"effect": effect, "weight": 1.0}, mesh=mesh, masses=[{"density": 0.25}])
     sides = np.ptp(scene.mesh.points, axis=0)
     assert scene.masses.sum() == pytest.approx(0.25 * np.prod(sides[sides > 1e-9]))
@@ -97,7 +97,7 @@ def scene_with(group, *factors, weight=1e4):
 
 @pytest.mark.parametrize("group", GROUPS)
 def test_factors_multiply_weights_of_selected_elements_and_no_others(group):
-    """All elements times a factor run as with the product as weight, through compiled kernels."""
+    """A factor for all elements gives the run of the multiplied weight, in compiled kernels."""
     plain, changed = scene_with(group), scene_with(group, {"select": BOX, "factor": 7.0})
     inside = changed.mesh.points[:, 0] <= 0.1 + 1e-6
     elements = inside[plain.groups[0].element_vertices(plain.mesh)].all(axis=1)

@@ -1,4 +1,4 @@
-"""Errors in what users look at, against runs whose errors are known."""
+"""Errors of positions, shapes and velocities of runs whose errors are known."""
 
 from types import SimpleNamespace
 
@@ -13,7 +13,7 @@ from pdrom.reduction.deviations import DEVIATIONS, ERRORS, REFERENCE, Yardstick,
 from pdrom.reduction.rerun import displacement_norms
 
 SPRING = {"effect": "spring", "weight": 1e4}
-FRAMES = 42  # the last one is no multiple of STRIDE
+FRAMES = 42  # the last frame is no multiple of STRIDE
 
 
 def yardstick(*effects, **settings) -> Yardstick:
@@ -45,13 +45,13 @@ def test_the_full_order_run_has_error_zero_and_a_diverged_run_none():
 
 
 def test_a_rigid_motion_is_a_position_error_and_half_the_speed_a_velocity_error():
-    """Half the motion has half the norms of the full order; a rigid motion leaves the shape."""
+    """A run of half the displacement has half the norms; a rigid motion leaves the shape."""
     measure = yardstick(FLOOR)
     moved = measure.reference @ random_rotation(np.random.default_rng(3)).T + [0.3, 0.1, -0.2]
     found = errors(measure, moved)
     assert found["relative_error_within_horizon"] > 0.1
     assert found["deformation_error"] == pytest.approx(0.0, abs=1e-10)
-    assert errors(yardstick(), moved)["deformation_error"] is None  # it falls and stays flat
+    assert errors(yardstick(), moved)["deformation_error"] is None  # the sheet falls and stays flat
     start = measure.reference[0]
     found = errors(measure, start + 0.5 * (measure.reference - start))
     assert found["velocity_error"] == pytest.approx(0.5)
@@ -74,7 +74,7 @@ def test_position_and_deformation_errors_cover_the_same_frames_and_weigh_masses(
 
 
 def test_energy_drift_of_a_run_that_stands_still():
-    """It keeps the energy of the start; the full order falls and loses none of its springs'."""
+    """It keeps its initial energy; the full-order run falls and keeps the energy of its springs."""
     measure = yardstick({"effect": "damping", "rate": 2.0})
     own = measure.series["energy"]
     found = errors(measure, measure.reference[:1].repeat(FRAMES + 1, axis=0))

@@ -1,4 +1,4 @@
-"""Specifications of methods: combinations that do not exist."""
+"""Specifications of methods refuse combinations that do not exist."""
 
 import pytest
 from pydantic import ValidationError

@@ -1,4 +1,4 @@
-"""Settings of a scene: labels, errors against the converged run, timing, and which are best."""
+"""Settings of a scene: labels, errors against the converged run, times, and the best ones."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def test_every_mesh_has_every_number_of_iterations_with_its_labels(scene):
     assert [each.labels["iterations"] for each in made] == [2, 5] * 3
     sizes = [scene.mesh.vertices, *(mesh.scene.mesh.vertices for mesh in meshes)]
     assert [each.labels["vertices"] for each in made] == np.repeat(sizes, 2).tolist()
-    # the loop does what its labels say
+    # the loop runs with the settings of its labels
     assert (made[0].run(8, 1.0) == trajectory(scene.iterated(2))).all()
     assert (made[1].run(8, 1.0) == trajectory(scene.iterated(5, 3))).all()
     own = [meshes[0].positions(y) for y in trajectory(meshes[0].scene.iterated(2))]

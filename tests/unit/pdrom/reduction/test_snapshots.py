@@ -1,4 +1,4 @@
-"""Which frames train and which test, row masses, and the files of snapshots."""
+"""Training and test frames, row masses, and files of snapshots."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_training_and_test_frames_are_disjoint_and_spread(frames, data):
 
 
 def test_the_mass_of_a_vertex_is_divided_equally_among_its_elements(group_scene, rng):
-    """All rows of an element have the element's mass; no mass of a touched vertex is left."""
+    """All rows of an element have its mass; the mass of a vertex with elements is used up."""
     group = group_scene.groups[0]
     masses = rng.uniform(0.5, 2.0, group_scene.mesh.vertices)
     rows = snapshots.row_masses(group, masses).reshape(group.elements, group.rows_per_element)
@@ -45,7 +45,7 @@ def test_the_mass_of_a_vertex_is_divided_equally_among_its_elements(group_scene,
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """Scene with a training and a held-out run of 12 frames."""
+    """Scene with a training and a test run of 12 frames."""
     folder = tmp_path_factory.mktemp("runs")
     scene = make_scene(GRAVITY, TOP, {"effect": "spring", "weight": 1e4}, frames=12)
     run(scene, folder / "train.h5", {"spring": snapshots.stored_frames(12, 3)})
@@ -54,7 +54,7 @@ def runs(tmp_path_factory):
 
 
 def collected(runs, frames=TRAIN, **paths):
-    """Snapshots of the runs, or of other files in their place."""
+    """Snapshots of the runs, or of other files instead of theirs."""
     scene, folder = runs
     files = {name: folder / f"{name}.h5" for name in ("train", "held")} | paths
     return snapshots.collect(files["train"], files["held"], scene.groups[0], scene.masses, frames)

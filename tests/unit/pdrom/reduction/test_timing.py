@@ -73,13 +73,13 @@ def test_assembly_is_subtracted_from_the_local_step_and_phases_add_up():
     assert result["assembly_ms"] == pytest.approx(2.0)
     assert result["local_ms"] == pytest.approx(50.0 - 2.0)
     assert result["inertia_ms"] == pytest.approx(20.0)
-    assert result["lift_ms"] == 0.0  # set back before the run, and this step never lifts
+    assert result["lift_ms"] == 0.0  # reset before the run, and this step never lifts
     assert sum(result[name] for name in PHASES[1:]) == pytest.approx(result["ms_per_frame"])
     assert result["ms_per_frame"] == pytest.approx(100.0)
 
 
 def test_times_of_some_iterations_are_extrapolated_to_all():
-    """Inertia is paid once a frame, the other phases with every iteration."""
+    """Inertia takes time once a frame, the other phases in every iteration."""
     clock = Clock("a", [], seconds(1.0))
     (result,) = measure([Variant({}, clock, START, 1, share=0.25)], 0, 1)
     assert [result[name] for name in ("inertia_ms", "local_ms", "global_ms", "ms_per_frame")] == [
@@ -88,7 +88,7 @@ def test_times_of_some_iterations_are_extrapolated_to_all():
 
 
 def test_the_time_of_a_frame_includes_the_positions_of_all_vertices():
-    """They are made after the two steps of a frame; frames may begin at states along a run."""
+    """They are computed after the iterations; frames may begin at states along a run."""
     made, calls, times = [], [], seconds(1.0, 1.0, 1.0, 1.0)
     show, starts = (lambda y: made.append(y[0, 0])), ((START, 5), (START, 9))
     whole = Variant({}, Clock("a", [], times), START, 4, output=show, steps=2)

@@ -60,7 +60,7 @@ def test_normals_are_unit_or_zero():
 
 
 def test_the_outlines_of_a_sheet_and_a_bar_are_their_edges():
-    """Wherever they are; of the box its twelve edges, with 3 and twice 2 segments."""
+    """At any position; a box has its twelve edges, with 3 and twice 2 segments."""
     for mesh, count in ((cloth(4, 5), 2 * (3 + 4)), (bar(4, 3, 3), 4 * (3 + 2 + 2))):
         here = np.random.default_rng(0).standard_normal(mesh.points.shape)
         found = mesh_render.outline_edges(mesh.points, here, mesh.triangles, Camera())

@@ -1,4 +1,4 @@
-"""The page of one model: it runs as in pdrom, fills the canvas, and its handles are dragged."""
+"""The page of one model runs it as pdrom does, fills the canvas, and its handles are dragged."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The viewer: positions survive packing, the page is one file, and it works in a real browser."""
+"""The viewer: packed positions are accurate, the page is one file and works in a real browser."""
 
 import base64
 import json
@@ -123,7 +123,7 @@ def test_a_page_that_is_too_large_is_refused(tmp_path, monkeypatch):
 def test_no_title_ends_a_script_of_the_page(tmp_path):
     write_page([viewed()], tmp_path / "x.html")
     text = (tmp_path / "x.html").read_text("utf-8")
-    # neither the element's end nor what hides it from a browser: a comment in which a script begins
+    # neither the end of the element nor a comment that hides it from a browser
     data = text.split('<script id="scenes" type="application/json">')[1].split("</script>")[0]
     assert "<" not in data
     assert json.loads(data)[0]["title"] == viewed().title
@@ -176,7 +176,7 @@ def go_to(page: Page, frame: int) -> None:
 
 
 def differ(first: np.ndarray, second: np.ndarray) -> bool:
-    """Whether more than a thousandth of the pixels changed clearly."""
+    """Whether more than 0.1 % of the pixels changed clearly."""
     return np.mean(np.abs(first - second).max(axis=2) > 30) > 1e-3
 
 
@@ -196,7 +196,7 @@ def test_a_truncated_page_says_so(tmp_path: Path) -> None:
 def test_runs_frames_obstacles_and_the_direction_up_are_seen_without_a_network(
     tmp_path: Path,
 ) -> None:
-    """The sheet is lit, and the same shape is another picture if up is another direction."""
+    """The sheet is lit, and the picture of a shape depends on the direction up."""
     sideways = [{"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}]
     others = viewed("obstacles", effects=OBSTACLES), viewed("sideways", effects=sideways)
     write_page([viewed(), *others], tmp_path / "index.html")

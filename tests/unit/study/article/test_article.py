@@ -1,4 +1,4 @@
-"""The article: every number is the PDF's and leads to its rows, no link is broken, it opens."""
+"""The article: every number equals that of the PDF and links to its rows, every page opens."""
 
 import base64
 import gzip
@@ -124,7 +124,7 @@ INPUTS = (
 
 
 def write_study(folder: Path) -> dict[str, object]:
-    """A manuscript of two documents with what it reads; arguments of `article`."""
+    """A manuscript of two documents with its inputs; arguments of `article`."""
     for name, table in TABLES.items():
         write_table(table, folder / "tables" / f"{name}.csv")
     captions_of = {
@@ -194,7 +194,7 @@ def test_the_manuscript_omits_unreliable_times_and_says_so(tmp_path, monkeypatch
 
 
 def named(folder: Path, names: Iterable[str]) -> list[File]:
-    """Files of a folder, each with its name as its label."""
+    """Files of a folder, with their names as labels."""
     return [File(str(folder / name), {"name": Path(name).stem}) for name in names]
 
 
@@ -206,7 +206,7 @@ def write_pages(given: dict[str, object], out: Path) -> Path:
 
 @pytest.fixture(scope="module", autouse=True)
 def one_table() -> Iterator[None]:
-    """The table that the manuscripts of these tests contain, in place of those of the study."""
+    """Replace the tables of the study by the one table of the manuscripts of these tests."""
     with pytest.MonkeyPatch.context() as patch:
         for module in (build, textables):
             patch.setattr(module, "TEX_TABLES", {"tab_frontier": ranks})
@@ -215,7 +215,7 @@ def one_table() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The article of the small study; the page of models is another's."""
+    """The article of the small study; the page of models is replaced."""
     folder = tmp_path_factory.mktemp("article")
     pages = write_pages(write_study(folder), folder)
     (pages / "live.html").write_text("<!DOCTYPE html><title>Models</title>", encoding="utf-8")
@@ -240,7 +240,7 @@ class Links:
         ]
         for tag, words in re.findall(r"(<a [^>]*href=[^>]*>)(.*?)</a>", page, re.DOTALL):
             keys = self.keys(tag)
-            # of a formula, its TeX
+            # the TeX of a formula
             text = re.sub(r"<[^>]*>", "", re.sub(r"(?s)^.*<annotation[^>]*>", "", words))
             self.links.append((keys.get("class", ""), keys["href"], unescape(text)))
 
@@ -251,7 +251,7 @@ class Links:
 
 @cache
 def table_at(path: Path) -> pd.DataFrame:
-    """Table that a page holds, its rows counted."""
+    """Table in a page, with its number of rows."""
     page = path.read_text(encoding="utf-8")
     packed = re.search(r'id="data">([^<]*)<', page)
     assert packed
@@ -261,13 +261,13 @@ def table_at(path: Path) -> pd.DataFrame:
 
 @cache
 def rows_at(path: Path, key: str) -> int:
-    """How many rows of a page's table agree with a key."""
+    """Number of rows of a page's table that agree with a key."""
     parts = [re.fullmatch(r"(.*?)(!?=)(.*)", part) for part in key.split("|")]
     return len(matching(table_at(path), [part.groups() for part in parts if part]))
 
 
 def test_each_number_equals_that_of_the_pdf_and_links_to_its_cells(small):
-    """The numbers of the macros, in order, and the rows of the page that a link opens."""
+    """Compares the numbers of the macros, in order, with the rows that each link opens."""
     origins = json.loads((small.parent / "inputs" / "numbers.json").read_text(encoding="utf-8"))
     numbers, seen = {number["key"]: number for number in origins["numbers"].values()}, set()
     asked = {entry.key: entry for entry in entries(small.parent / "paper").values()}
@@ -323,7 +323,7 @@ def test_numbers_link_to_rows_that_agree_in_the_common_columns(cells, key, numbe
 
 
 def study_or_small(small: Path) -> list[Path]:
-    """The small article and, where a run has made it, that of the full study."""
+    """The small article and, if a run has made it, that of the full study."""
     made = ROOT / "results" / "article"
     return [small, *([made] if (made / "index.html").is_file() else [])]
 
@@ -364,7 +364,7 @@ def numbers_of_tex(sources: Mapping[str, str], inputs: Path, folder: Path) -> di
 
 
 def test_references_have_the_numbers_of_the_pdf(small, tmp_path):
-    """Those of TeX's .aux files; of the full study, too, where a run has made its article."""
+    """Reference: TeX's .aux files, also of the full study if a run has made its article."""
     for pages in study_or_small(small):
         paper, inputs = (
             (pages.parent / "paper", pages.parent / "inputs")

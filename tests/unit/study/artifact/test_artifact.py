@@ -19,7 +19,7 @@ SCENE = Place("a/{scene}.csv")
 
 
 class Section(ConfigModel):
-    """As much of a section as the function asks for."""
+    """Keys of a section that the function reads."""
 
     factor: float
 
@@ -42,7 +42,7 @@ def multiplied(table: File, section: Section, out: File) -> None:
     write_table(read_table(table.path) * section.factor, out.path)
 
 
-# A study, as far as it is asked; the files of a real one: test_jobs.py.
+# A stub of a study; test_jobs.py tests the files of a real one.
 SETTINGS = {"section": Whole(factor=2.0), "factor": 3.0}
 STUDY = SimpleNamespace(value=lambda key, labels: SETTINGS[key])
 

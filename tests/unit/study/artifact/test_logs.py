@@ -1,4 +1,4 @@
-"""What a job leaves in its log, its usage in the last line, and what the user sees if it fails."""
+"""Logs of jobs: messages, the usage in the last line, and the output of a failed job."""
 
 import errno
 import logging
@@ -47,7 +47,7 @@ def test_messages_of_the_package_are_in_the_log_of_the_last_job(path):
 
 
 def test_only_jobs_limit_libraries_to_one_thread_and_rename_damaged_results(path):
-    """Snakemake sets as many as the job claims, and timing jobs claim every core."""
+    """Snakemake would allow as many threads as cores, and timing jobs claim every core."""
 
     def threads() -> set[int]:
         return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
@@ -71,7 +71,7 @@ def test_only_jobs_limit_libraries_to_one_thread_and_rename_damaged_results(path
     ],
 )
 def test_a_failed_job_ends_with_one_line(path, failure, said):
-    """Those of the user in one line without a traceback, which the log has of all others."""
+    """Errors of the user have no traceback; the log has it for all other errors."""
     with pytest.raises(SystemExit) as caught, job_log(str(path)):
         raise failure
     assert caught.value.code.startswith(f"pdrom: {said}")

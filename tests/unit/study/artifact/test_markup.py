@@ -1,4 +1,4 @@
-"""Captions in light mark-up as TeX; titles as plain words."""
+"""Captions in light mark-up become TeX; titles become plain words."""
 
 from study.artifact.text import filled, number, to_plain, to_tex
 from study.figures.kit.declaration import declarations

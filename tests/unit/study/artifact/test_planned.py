@@ -1,4 +1,4 @@
-"""Jobs run the code that the run has planned: forked, alone, or started by another job."""
+"""Jobs run the code that was planned: forked, in a new process, or started by another job."""
 
 import json
 import os
@@ -33,7 +33,7 @@ for _ in "ab":
     ids=["a fork", "without a server", "a process of a job"],
 )
 def test_a_job_imports_the_code_that_the_plan_has_read(owner, tmp_path):
-    """The file in ``src`` has another text all the time; the second job finds compiled code."""
+    """The file in ``src`` has another text meanwhile; the second job finds compiled code."""
     (tmp_path / "job.py").write_text(f"import {MODULE}")
     path, kept = plan()[MODULE][0], tmp_path / "plan.json"
     for word in ("planned", "planned again"):

@@ -1,4 +1,4 @@
-"""Text of users: everything that is let through is typeset, the rest is refused by name."""
+"""Texts of users: accepted characters are typeset, all others are refused by name."""
 
 import unicodedata
 import warnings
@@ -41,7 +41,7 @@ def test_every_special_character_is_escaped():
 
 
 def test_every_accepted_character_is_typeset(tmp_path):
-    """One document with every character, compiled without an error by the preamble's packages."""
+    """One document with every character compiles with the packages of the preamble."""
     assert len(EVERY) > 350
     preamble = whole_source(ROOT / "paper" / "main.tex").split(r"\input{macros")[0]
     lines = [rf"\noindent x{escape(c)}y \texttt{{x{escape(c)}y}}" + "\n" for c in EVERY]

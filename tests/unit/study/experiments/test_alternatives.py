@@ -1,4 +1,4 @@
-"""Experiment alternatives: errors against both references, and the tables of its rows."""
+"""Experiment `alternatives`: errors against both references, and tables of its rows."""
 
 import pandas as pd
 import pytest
@@ -27,7 +27,7 @@ STEPS = {
     "coarser-mesh-anderson": ((1, 10),),
 }
 MODELS = ({"modes": 4, "training_motions": (1, 3)}, {"modes": 3, "training_motions": (3,)})
-COARSER, SETTINGS = {20, 16}, 8 + 3 * 2 + 3 * 2  # full order on its mesh, on coarser ones, models
+COARSER, SETTINGS = {20, 16}, 8 + 3 * 2 + 3 * 2  # full-order model, coarser meshes, reduced models
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_a_scene_has_a_row_for_every_setting_mesh_and_trajectory(written, table)
     raw = read_table(written[1].path)
     assert raw.columns.tolist() == experiment.TIME_COLUMNS
     assert len(table) == len(made)
-    # beside every setting, the converged step has a row for each mesh, and playback has one
+    # plus a row of the converged step for each mesh, and one of replaying the training trajectory
     motions = [*MOTIONS, "validation_1"]
     assert table.motion.value_counts().to_dict() == dict.fromkeys(motions, SETTINGS + 4)
     assert {*table.vertices[table.method.str.startswith("coarser-mesh")]} == COARSER
@@ -98,7 +98,7 @@ def test_errors_of_a_scene_are_against_the_converged_step(table):
     assert own.error_implicit[30] == 0.0
     assert case.elements_sampled["ecsw", 1, 5].item() > 0
     assert case.error_implicit["playback", 1].item() > 0.3
-    # many iterations on a coarser mesh end at its own converged step
+    # many iterations on a coarser mesh end at the converged step of that mesh
     coarse = case.loc[("coarser-mesh", 1, 2000)].set_index("vertices").error_implicit
     pd.testing.assert_series_equal(coarse, own.error_implicit[coarse.index], rtol=1e-3)
     assert own.error_implicit[16] > own.error_implicit[20] > 1e-3

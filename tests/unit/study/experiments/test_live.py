@@ -1,4 +1,4 @@
-"""Models that the experiment writes for the page run in its engine as they run in pdrom."""
+"""The engine of the page runs the models that the experiment writes as pdrom does."""
 
 import json
 
@@ -20,7 +20,7 @@ WEIGHTS = {"spring": 1e3, "strain": 1e4, "tetrahedron_strain": 1e6, "deformation
 
 
 def scene_with(group: str) -> Scene:
-    """A body of one group that hangs from its left side for a while, then falls on a floor."""
+    """A body of one group that hangs from its left side, is released and falls on a floor."""
     pins = {"effect": "pins", "select": "left", "until": 9}
     own = {"effect": group, "weight": WEIGHTS[group]}
     settings = {"mesh": GROUPS[group], "frames": FRAMES, "iterations": 4}
@@ -111,7 +111,7 @@ return given.matrices.map((matrix) => {
 @pytest.mark.parametrize(("low", "high"), [(1.0, 1.0), (0.95, 1.1)])
 @pytest.mark.parametrize(("name", "rows"), [("clamp2", 2), ("clamp3", 3)])
 def test_projections_are_the_nearest_matrices(name, rows, low, high):
-    """Also for flat, inverted, tiny and huge matrices whose nearest matrix is unique."""
+    """Also for flat, inverted, tiny and huge matrices if their nearest matrix is unique."""
     rng = np.random.default_rng(0)
     matrices = rng.standard_normal((60, rows, 3))
     matrices[20:40] = np.eye(3)[:rows] + 0.02 * matrices[20:40]

@@ -1,4 +1,4 @@
-"""Experiment online: the rows of one scene."""
+"""Experiment `online`: the rows of one scene."""
 
 from functools import partial
 
@@ -43,7 +43,7 @@ def written(tmp_path_factory):
     experiment.online([], config, asked, out=out, models=stored)
     mesh, *times = (File(str(path.with_name(n)), {}) for n in ("mesh.h5", "times.csv", "s.csv"))
     save_mesh(scene.mesh, mesh.path)
-    # as a scene of the study and as a large one
+    # as a scene of the study and as a large scene
     named = (timing.NamedScene(scene=config.name, config=config),)
     settings = timing.Options(
         frame_times=ONCE, timed_scenes=named, large_scenes=named, subspace_cases=(),
@@ -72,7 +72,7 @@ def test_every_model_has_its_errors_and_its_time_in_a_fresh_process(written):
     for column in ("relative_error_train", "relative_error_heldout"):
         assert table[column].between(1e-6, 1.0).all()
     assert (table.relative_error_heldout_high > table.relative_error_heldout).all()
-    # the held-out motion starts with a kick that the training has not seen
+    # the test trajectory starts with a kick that the training does not contain
     assert (table.relative_error_heldout > table.relative_error_train).any()
 
     assert timed.role.tolist() == ["full", "control", *4 * ["reduced"]]
@@ -81,7 +81,7 @@ def test_every_model_has_its_errors_and_its_time_in_a_fresh_process(written):
     np.testing.assert_allclose(table.ms_per_iteration, table.ms_per_frame / 10)
     full = timed.ms_per_frame[timed.role == "full"].item()
     np.testing.assert_allclose(table.speedup, full / table.ms_per_frame)
-    # the files hold the same models
+    # the files contain the same models
     assert table.ms_per_frame.tolist() == timed.ms_per_frame[2:].tolist()
     none = pd.DataFrame()
     quoted = speedups(timed, frame_times(timed), none, none, rows, NO_RERUNS)

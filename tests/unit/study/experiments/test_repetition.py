@@ -1,4 +1,4 @@
-"""Repetitions of reduced runs, methods of the ladder, and runs with bases of round-off."""
+"""Repeated reduced runs, the ablation, and runs with bases of rounding errors."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ END = 9
 
 @pytest.fixture(scope="module")
 def sheet() -> tuple[Scene, np.ndarray, SnapshotSet]:
-    """A hanging sheet of springs, its run of 12 frames, and the projections of it."""
+    """A hanging sheet of springs, its run of 12 frames, and the projections of the run."""
     gravity = {"effect": "gravity", "acceleration": [0.0, 0.0, -9.81]}
     scene = make_scene({"effect": "spring", "weight": 1e4}, gravity, TOP, frames=12)
     reference, group = trajectory(scene), scene.group("spring")
@@ -88,7 +88,7 @@ def test_bases_of_several_training_trajectories_are_run_on_the_test_trajectories
 
 
 def test_a_diverged_run_has_an_infinite_error(short, monkeypatch):
-    """The limit is half of the extent of the sheet, so that the run ends after one frame."""
+    """The limit is half the extent of the sheet, so that the run ends after one frame."""
     monkeypatch.setattr("pdrom.reduction.deviations.BLOWUP_EXTENT", 0.5)
     (run,) = short.repeat(BLOCK, [3], "start", Repetitions(repetitions=1))
     assert np.isinf(run["error"])
@@ -141,7 +141,7 @@ def test_a_flat_mesh_may_keep_its_plane(fall):
 
 
 def test_the_shared_row_selection_fails_if_an_axis_has_no_signal(fall, tmp_path):
-    """Without noise in an axis the system of that axis is singular; with noise it is not."""
+    """The system of an axis is singular without noise and regular with noise."""
     asked = module.NoiseRuns(sizes=(2, 5, 99), repetitions=2)
     methods = {name: METHODS[name] for name in ("deim-joint", "published")}
     runs = tmp_path / "noise.h5"

@@ -1,4 +1,4 @@
-"""Growth of perturbations, horizons, and the contribution of each effect to a run."""
+"""Growth of perturbations, predictability horizons, and the contribution of each effect."""
 
 import numpy as np
 import pandas as pd
@@ -46,7 +46,7 @@ def test_the_table_has_every_perturbation_seed_variant_and_frame():
 
 
 def test_sensitivities_are_maxima_over_seeds_and_horizons_are_read_as_written(tmp_path):
-    """Labels are found as text and, where all labels in the file are numbers, as numbers."""
+    """Labels are found as text and, if all labels in the file are numbers, as numbers."""
     floors = perturbed_runs()
     write_table(floors[floors.perturbation == "1e-10"], tmp_path / "sensitivity.csv")
     read = read_table(tmp_path / "sensitivity.csv")

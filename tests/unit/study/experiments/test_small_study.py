@@ -1,6 +1,6 @@
-"""Files of one scene's experiments, each compared with what follows from those that it read.
+"""Each file of one scene's experiments is compared with consequences of the files that it read.
 
-The scene is a sheet of springs, held at its left side, that falls for eight frames.
+The scene is a sheet of springs, fixed at its left side, that falls for eight frames.
 """
 
 from collections.abc import Callable
@@ -63,7 +63,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
 
 @pytest.fixture(scope="module")
 def at(study: Study) -> PathOf:
-    """Path of a finished file; of several of a kind that of `METHOD`."""
+    """Path of a finished file; if there are several of a kind, that of `METHOD`."""
     results = str(study.root / "results")
     run_jobs(study, results, JOBS, SCENE)
     known = {
@@ -89,7 +89,7 @@ def array(at: PathOf) -> Callable[[Place, str], np.ndarray]:
 
 @pytest.fixture
 def again(study: Study, at: PathOf, tmp_path: Path) -> Callable[..., dict[str, pd.DataFrame]]:
-    """Make an experiment once more, with other arguments; its tables."""
+    """Run an experiment again with other arguments and return its tables."""
 
     def made(experiment: Experiment, **changes: object) -> dict[str, pd.DataFrame]:
         labels = {"scene": SCENE, "group": GROUP}
@@ -118,12 +118,12 @@ def norms(values: np.ndarray) -> np.ndarray:
 
 
 def whole(difference: np.ndarray, moved: np.ndarray) -> float:
-    """Relative error of a run: norms over all frames."""
+    """Relative error of a run, in norms over all frames."""
     return float(np.linalg.norm(difference) / np.linalg.norm(moved))
 
 
 def test_a_run_starts_at_rest_fixes_its_pins_and_lowers_the_objective(array, mesh):
-    """Nothing damps: velocities are what the positions say."""
+    """Without damping, velocities are the differences of positions."""
     q, v = array(paths.TRAIN, "positions"), array(paths.TRAIN, "velocities")
     assert np.array_equal(q[0], mesh.points)
     left = mesh.points[:, 0] == mesh.points[:, 0].min()
@@ -134,7 +134,7 @@ def test_a_run_starts_at_rest_fixes_its_pins_and_lowers_the_objective(array, mes
 
 
 def test_projection_errors_are_tails_of_the_singular_values(at, array, table):
-    """The sampled reconstruction is worse than the best one, by its gain at most."""
+    """The error of the sampled reconstruction is at most the DEIM constant times the best error."""
     train = array(paths.SNAPSHOTS, "train")
     sigma = array(paths.BASIS, "singular_values")
     tails = {r: np.linalg.norm(sigma[r:]) / np.linalg.norm(train) for r in (1, 2, 3)}
@@ -162,7 +162,7 @@ def test_the_table_of_reruns_has_the_differences_from_the_full_order_run(array, 
         assert row.relative_error == pytest.approx(whole(difference, moved))
         assert (row.frames, row.finite) == (8, True)
         positions = array(paths.RERUNS, f"{name}/positions")  # in single precision
-        if run != "train":  # of a test trajectory every 20th frame is stored
+        if run != "train":  # every 20th frame of a test trajectory is stored
             np.testing.assert_array_equal(positions, reference[::20].astype(np.float32))
             continue
         assert difference == pytest.approx(norms(positions[1:] - reference[1:]), abs=1e-5)
@@ -172,7 +172,7 @@ def test_the_table_of_reruns_has_the_differences_from_the_full_order_run(array, 
 
 
 def test_sensitivities_grow_in_proportion_and_without_gravity_the_sheet_stays(array, table):
-    """All that the run does is then a difference."""
+    """The complete displacement is then a difference between the two runs."""
     drifts = table(paths.SENSITIVITY).set_index(["perturbation", "seed", "frame"])
     drifts = drifts.relative_difference
     ratio = drifts["1e-08"] / drifts["1e-10"]
@@ -199,7 +199,7 @@ def test_contributions_are_forces_and_energies_of_the_run(array, table, mesh):
 
 def test_more_iterations_approach_the_converged_run(table):
     rows = table(paths.ITERATIONS)
-    rows = rows[rows.vertices == rows.vertices.max()]  # of the own mesh
+    rows = rows[rows.vertices == rows.vertices.max()]  # the mesh of the scene
     plain = rows[rows.window == 0].sort_values("iterations")
     mixed = rows[rows.window == 5].set_index("iterations").error_converged
     assert plain.iterations.tolist() == [1, 2, 5, 10, 20, 60]
@@ -223,7 +223,7 @@ def test_errors_on_test_trajectories_are_those_that_numpy_finds_in_the_stored_ru
     assert made.motion.tolist() == list(MOTIONS)
     training = array(paths.CONVERGED.where(run="train"), "positions")[1:]
     rest = np.repeat(mesh.points[None], 8, axis=0)
-    affine = np.c_[mesh.points[:, [0, 2]], np.ones(len(mesh.points))]  # of a flat mesh
+    affine = np.c_[mesh.points[:, [0, 2]], np.ones(len(mesh.points))]  # a flat mesh
     for row in made.itertuples():
         limit = array(paths.CONVERGED.where(run=row.motion), "positions")[1:]
         full = array(paths.FULL_ORDER.where(run=row.motion), "positions")[1:]
@@ -238,7 +238,7 @@ def test_errors_on_test_trajectories_are_those_that_numpy_finds_in_the_stored_ru
 
 
 def test_the_error_of_a_reference_is_set_by_its_tolerance(again, table):
-    """Its second solve is a hundred times finer and starts from the frame's beginning."""
+    """The second solve has a hundredth of the tolerance and starts from the previous frame."""
     with patch("study.experiments.references.ConvergedStepper", wraps=ConvergedStepper) as solves:
         coarse = again(references, asked=Reference(tolerance=1e-3))["out"]
     found = [(call.args[2], call.kwargs["from_last"]) for call in solves.call_args_list]
@@ -249,7 +249,7 @@ def test_the_error_of_a_reference_is_set_by_its_tolerance(again, table):
 
 
 def test_the_sweep_ends_at_the_horizon_or_an_unconverged_reference(again, table, tmp_path):
-    """Nothing is compared with such a run."""
+    """No run is compared with an unconverged reference."""
     floor = table(paths.SENSITIVITY)
     early = File(str(tmp_path / "floor.csv"), {"scene": SCENE})
     write_table(floor.assign(relative_difference=np.where(floor.frame < 5, 1e-9, 1.0)), early.path)
@@ -263,7 +263,7 @@ def test_the_sweep_ends_at_the_horizon_or_an_unconverged_reference(again, table,
 
 
 def test_every_time_step_and_stiffness_has_every_model_once(again, monkeypatch):
-    """(h, ratio): own, other h, other ratio; full order, two methods at two sizes, two models."""
+    """(h, ratio): default, other h, other ratio; full order, two methods at two sizes, 2 models."""
     monkeypatch.setattr("study.experiments.stability.FEWEST", 4)
     monkeypatch.setattr("study.experiments.stability.MOST", 6)
     asked = ShortRuns(time_steps=(0.1,), stiffness_ratios=(0.01,), ranks=(2, 30), duration=0.08)
@@ -316,7 +316,7 @@ def test_a_perturbed_start_keeps_the_error_and_other_training_frames_change_it(t
 
 
 def test_every_ablation_step_is_run_and_has_its_errors(study, again, array):
-    """Whole elements with shared coefficients are worse than the best by their gain at most."""
+    """Element-wise sampling with shared coefficients is at most its constant times the best."""
     few = {"r": 2, "signs": 2, "repetitions": 3, "sizes": (2, 50), "repeated": (SCENE,)}
     asked = LadderSection(**read_yaml(CONFIG / "default.yaml")["ladder"]).model_copy(update=few)
     job = Plan(study).job(repetitions, {"scene": SCENE, "group": GROUP})

@@ -36,8 +36,8 @@ SCENES = (
     "cloth_all", "bend_fall", "bend_curved", "spring_stretch", "spring_twist", "spring_twist_twin",
     "strain_twist", "strain_oop", "bar_release", "bar_twist",
 )  # fmt: skip
-FLAT = ("bend_fall",)  # scenes whose projections are round-off
-BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method, r of a run that fails
+FLAT = ("bend_fall",)  # scenes whose projections are rounding errors
+BLOWN_UP = ("spring_twist", "deim-joint", 10)  # scene, method and r of a diverged run
 BLOWUP_FRAME = 4
 SETTINGS = {
     **read_yaml(CONFIG / "default.yaml"),
@@ -60,19 +60,19 @@ class Invented:
         return Plan(self.study, Folders(str(self.root))).file(place, labels)
 
     def job(self, name: str, root: Path | None = None, **changes: object) -> Job:
-        """Job of a figure that is declared with other scenes or methods."""
+        """Job of a figure with other scenes or methods than it declares."""
         names = {key: " ".join(value) for key, value in changes.items()}
         figure = replace(declarations()[name], **names)
         with patch.dict(declarations(), {name: figure}):
             return Plan(self.study, Folders(str(root or self.root))).job(figure, {})
 
     def read(self, name: str, root: Path | None = None, **changes: object) -> dict[str, object]:
-        """What the function of a figure gets."""
+        """Inputs of the function of a figure."""
         job = self.job(name, root, **changes)
         return job.artifact.read(job.settings, job.inputs)
 
     def draw(self, name: str, tables: Mapping[str, object] = {}, **changes: object) -> Figure:
-        """Draw a figure from other ``tables``, by the names of what it reads."""
+        """Draw a figure from other ``tables``, by the names of its inputs."""
         return declarations()[name].draw(**{**self.read(name, **changes), **tables})
 
 
@@ -87,7 +87,7 @@ def make_results(results: Invented) -> None:
     for scene, config in results.study.scenes.items():
         mesh = mesh_of(scene)
         save_mesh(mesh, results.path(paths.MESH, scene))
-        # the mesh bends more and more and sinks to the floor
+        # the mesh bends increasingly and sinks to the floor
         t = np.linspace(0.0, 1.0, FRAMES + 1)[:, None]
         positions = np.repeat(mesh.points[None], FRAMES + 1, axis=0)
         positions[:, :, 2] += 0.4 * t * np.sin(4.0 * mesh.points[:, 0])
@@ -149,7 +149,7 @@ def _write_reruns(results, scene, group, method, positions, rank, rng) -> None:
 
 
 def reference(name: str) -> pd.DataFrame:
-    """The tracked table of the full study, else of the tiny one, with times that are invented."""
+    """The tracked table of the full or the tiny study, with invented times."""
     folders = (ROOT / "results/reference/tables", ROOT / "results/reference/studies/tiny/tables")
     path = next(path for folder in folders for path in folder.glob(f"{name}.csv*"))
     table, made = pd.read_csv(path), declared()[name]
@@ -175,7 +175,7 @@ def _write_tables(results: Invented) -> None:
 
 
 def _write_noise_runs(results, scene) -> None:
-    """Runs that do not start where round-off stays in the plane, else the sheet at rest."""
+    """Runs that do not start if rounding errors stay in the plane; otherwise the sheet at rest."""
     points = mesh_of(scene).points
     with write_hdf5(results.path(paths.NOISE_RUNS, scene, "bending")) as file:
         for axes, frames in (("all", FRAMES), ("plane", 0), ("vertex", FRAMES)):
@@ -186,7 +186,7 @@ def _write_noise_runs(results, scene) -> None:
 
 
 def _write_floors(results, scene) -> None:
-    """Floors, which rise for springs only."""
+    """Sensitivities, which rise for springs only."""
     floors = [
         (scene, label, i, 10.0 ** (-9 + (0.5 * i if "spring" in scene else 0.05)))
         for label in ("1e-10", "solver")
@@ -203,7 +203,7 @@ def study(tmp_path_factory) -> Invented:
 
 @pytest.fixture
 def small_study(tmp_path) -> Callable[[Sequence[str], Sequence[str]], Invented]:
-    """Maker of a study with other scenes and methods, which a test may change."""
+    """Function that makes a study with other scenes and methods, which a test may change."""
     return partial(Invented, tmp_path)
 
 

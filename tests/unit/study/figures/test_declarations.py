@@ -1,4 +1,4 @@
-"""What figures declare, and the inputs that follow for a study."""
+"""Declarations of figures, and their inputs in a study."""
 
 import os
 import subprocess

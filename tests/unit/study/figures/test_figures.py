@@ -1,4 +1,4 @@
-"""Every figure draws from invented results; what it says about failures and missing data."""
+"""Every figure draws invented results, marks failures, and names missing data."""
 
 import warnings
 from itertools import pairwise
@@ -29,7 +29,7 @@ from .conftest import BLOWN_UP, BLOWUP_FRAME, FRAMES, ROOT, mesh_of, reference
 
 PICTURES = ("snapshots_and_modes", "deim_iterations", "cloth_all_grid", "bending_runs",
             "spring_runs", "strain_runs", "bar_runs", "teaser")  # fmt: skip
-ROWS = ("local_share", "error_budget", "ladder")  # figures whose rows have names
+ROWS = ("local_share", "error_budget", "ladder")  # figures with named rows
 
 
 def runs(study, name: str, scene: str, frames=(0.3,), ranks=RANKS, **changes) -> Figure:
@@ -46,7 +46,7 @@ def texts(figure: Figure) -> list[str]:
 def test_every_figure_is_written_without_warnings_and_its_panels_hold_data(
     study, figure_name, tmp_path
 ):
-    """Positions have few digits: the last bits of the layout's solver differ between drawings.
+    """Positions have few digits, because the layout's solver differs in the last bits.
 
     Axes are laid out once, and written where they lie.
     """
@@ -87,15 +87,15 @@ def test_a_failed_run_is_marked_and_never_drawn_with_nan(study):
     assert len(marked) == 1
     hatched = [p for ax in figure.axes for p in ax.patches if p.get_hatch()]
     assert len(hatched) == 1
-    # the last stored state is not finite: the one before it is drawn
+    # the last stored state is not finite: the previous state is drawn
     assert f"drawn: frame {BLOWUP_FRAME - 1}" in marked[0]
-    # a failure later than the drawn instant is none
+    # a failure after the drawn instant is not marked
     early = runs(study, "spring_runs", scene, frames=(0.1,))
     assert not any("blew up" in text for text in texts(early))
 
 
 def test_a_diverged_run_lies_on_the_upper_edge_of_the_axes(study):
-    """Error against the constant: as high as the axis goes, and counted among the runs."""
+    """In the figure of error against constant it is at the top of the axes and counted as a run."""
     names = "scene group method r position_basis motion max_extent blowup_frame relative_error"
     runs = [
         ("spring_twist", "spring", method, r, "full", "train", 1.0, ended, error)
@@ -112,14 +112,14 @@ def test_a_diverged_run_lies_on_the_upper_edge_of_the_axes(study):
     (dots,) = (each for each in left.lines if len(each.get_xdata()) and each.get_marker() == "D")
     assert (dots.get_ydata() == left.get_ylim()[1]).all()
     assert dots.get_xdata().tolist() == [24.0, 42.0]
-    # constants from ten to a hundred, where all of the two runs failed
+    # constants from ten to a hundred, where both runs failed
     assert [bar.get_height() for bar in right.patches] == [100.0]
     assert [text.get_text() for text in right.texts] == ["2"]
     assert [tick.get_text() for tick in right.get_xticklabels()] == ["$10^{1}$ to $10^{2}$"]
 
 
 def test_failed_starts_are_counted_below_runs_with_bases_of_rounding_errors(study):
-    """Kinds of starts with equal counts share a row; sizes beyond the rank are left out."""
+    """Starts with equal counts share a row; sizes beyond the rank are left out."""
     runs = [
         ("bend_fall", "bending", axes, "deim-joint", r, 9, None if axes == "plane" else 1e-12)
         for axes in ("all", "plane", "vertex")
@@ -161,7 +161,7 @@ def test_rounding_errors_are_drawn_and_panels_of_missing_scenes_or_methods_omitt
 
 
 def test_figures_are_upright_and_have_the_obstacles_that_the_scene_lists(study):
-    """A floor alone has a shadow; of a scene without one none is drawn."""
+    """Only a floor has a shadow; a scene without a floor has none."""
     read = study.read("bar_runs", scenes=("bar_release",))
     (each,), full = read["drawn"].experiments, mesh_of("bar_release").points[None]
     gravity = Gravity.Config(acceleration=(0.0, 0.0, -9.81))
@@ -181,7 +181,7 @@ def test_figures_are_upright_and_have_the_obstacles_that_the_scene_lists(study):
 def test_the_first_figure_shows_a_test_trajectory_and_a_subspace_run_until_it_ended(
     small_study, monkeypatch, k, ran, shown
 ):
-    """The reduced projections are cut off at the frame of the reference, not drawn smaller."""
+    """Reduced projections end at the frame of the reference instead of being drawn smaller."""
     monkeypatch.setattr(pictures, "TEST_FRAMES", 2)
     study = small_study(["bar_release"], ["gappy"])
     path = study.path(RERUNS, "bar_release", "deformation_gradient", "gappy")
@@ -237,7 +237,7 @@ def test_the_horizon_is_the_first_frame_above_the_threshold(study):
 
 
 def test_error_against_time_has_a_labelled_curve_for_each_kind_of_model(study):
-    """Coarser meshes and subspaces are the best settings; other models are left out."""
+    """For coarser meshes and subspaces the best settings are drawn; other models are left out."""
     names = "scene method position_basis relative_error_within_horizon ms_per_frame"
     points = [("full", "full", 0.01, 4.0), ("fom-anderson", "full", 0.005, 4.5)]
     points += [("fom", "full", 1.0 / k, 0.4 * k) for k in (10, 2, 40)]
@@ -267,7 +267,7 @@ def test_labels_stand_next_to_a_point_of_their_curve():
 
 
 def test_the_ablation_has_a_line_for_each_scene_and_constants_of_two(study):
-    """A study with other steps has those of its list; a blown-up run is on the limit."""
+    """A study with other ablation steps has those of its list; a diverged run is at the limit."""
     names = "scene direction rung gain relative_error_within_horizon error_low error_high"
     rows = [("spring_twist", "up", "published code", 1234.0, None, None, None)]
     rows += [("spring_twist", "down", "and a gain of at most 2", 2.0, 0.01, 0.005, 0.02)]
@@ -308,7 +308,7 @@ def test_coarser_meshes_have_a_curve_and_the_mesh_of_the_scene_an_error():
 
 
 def test_a_doubtful_speedup_has_another_mark(study):
-    """Hollow: a large error; an arrow: a lower bound; a cross: not judged; errors of large meshes.
+    """Marks: hollow for a large error, an arrow for a lower bound, a cross if not judged.
 
     Of the reduced models the one with five iterations and most training trajectories is drawn.
     """

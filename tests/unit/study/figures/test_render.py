@@ -1,4 +1,4 @@
-"""Elements on the mesh, residuals of the selections, and the runs that figures read."""
+"""Drawn elements, residuals of the selections, and the runs that figures read."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The page on which models run: one file, scenes beside it, and it works in a real browser."""
+"""The page of models: one file, scenes next to it, and it works in a real browser."""
 
 import re
 from pathlib import Path
@@ -27,7 +27,7 @@ def test_scenes_with_models_are_named_in_order_and_a_damaged_file_is_refused(tmp
 
 
 def write_sheet(folder: Path) -> Path:
-    """Models of a sheet that hangs from one side, where the page of ``folder`` looks for them."""
+    """Write models of a sheet that hangs from one side for the page of ``folder``."""
     (folder / "live").mkdir()
     pull, pins = {"effect": "gravity"}, {"effect": "pins", "select": "left"}
     sheet = {"kind": "cloth", "rows": 8, "columns": 8, "plane": "xz"}
@@ -37,7 +37,7 @@ def write_sheet(folder: Path) -> Path:
 
 @pytest.mark.slow
 def test_of_scenes_selected_quickly_the_last_is_shown_and_a_missing_one_is_named(tmp_path):
-    """Files may come in any order; the page goes on after one that is missing."""
+    """Files may arrive in any order; the page continues after a missing file."""
     one = write_sheet(tmp_path)
     files = [one.with_name(f"{name}.js") for name in "abcd"]
     for file in files:
@@ -57,7 +57,7 @@ def test_of_scenes_selected_quickly_the_last_is_shown_and_a_missing_one_is_named
             page.wait_for_selector('body[data-ready="yes"]')
             assert page.inner_text("#about").startswith(title)
         for content in (None, whole[: len(whole) // 2], files[0].read_text()):
-            if content is not None:  # lost, cut, of another scene
+            if content is not None:  # missing, truncated, of another scene
                 files[3].write_text(content)
             page.evaluate(choose, [3])
             page.wait_for_selector("#verdict.bad")
@@ -99,7 +99,7 @@ def test_a_model_runs_is_drawn_and_follows_its_handle(drawn, tmp_path):
 
 
 def use(opened: Page) -> None:
-    """Watch a model to its end, move a handle by a key, and turn the picture by a pointer."""
+    """Run a model to its end, move a handle by a key, and turn the picture by a pointer."""
 
     def after(frame: int) -> None:
         opened.wait_for_function(f"Number(document.body.dataset.frame) >= {frame}")
@@ -115,7 +115,7 @@ def use(opened: Page) -> None:
     opened.wait_for_function(told.format("ended"))
     opened.click("#again")
     opened.wait_for_function(told.format("%"))
-    # a handle is moved by a key, held and let go
+    # a key that is pressed and released moves a handle
     opened.focus("#handles button")
     opened.keyboard.press("ArrowUp")
     opened.wait_for_function(
@@ -123,7 +123,7 @@ def use(opened: Page) -> None:
     )
     opened.get_by_role("button", name="Let go of left").click()
     opened.get_by_role("button", name="Hold left").wait_for()
-    # a pointer turns the picture where no handle lies, such as in the corner
+    # a pointer turns the picture if it is on no handle, for example in the corner
     opened.click("#again")
     opened.click("#play")
     box, before = canvas.bounding_box(), picture(canvas)
@@ -133,7 +133,7 @@ def use(opened: Page) -> None:
     opened.mouse.up()
     assert np.mean(np.abs(picture(canvas) - before).max(axis=2) > 30) > 1e-3
     assert opened.inner_text("#distance") != "unknown: you moved a handle"
-    # more coordinates than a card takes are drawn, too
+    # more coordinates than a graphics card accepts are drawn, too
     few, many = (opened.evaluate(LIFTED, size) for size in (12, 204))
     assert few == many > 100
     assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []

@@ -1,4 +1,4 @@
-"""Sentences of the manuscript that are left out without their numbers."""
+"""Optional blocks of the manuscript, which are left out if their numbers are missing."""
 
 import pytest
 

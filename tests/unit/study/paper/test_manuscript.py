@@ -1,4 +1,4 @@
-"""The manuscript: every number of its prose comes from a table; its references and figures."""
+"""The manuscript: every number of its text comes from a table; its references and figures."""
 
 import re
 
@@ -26,7 +26,7 @@ SOURCE = "".join(SOURCES.values())
 OWN = documents(ROOT / "paper" / "own")
 NUMBERS = entries(ROOT / "paper")
 
-# What may hold digits without stating a result: mathematics, keys, lengths, names of claims.
+# Text whose digits state no result: mathematics, keys, lengths, names of claims.
 _NOT_PROSE = [
     r"(?<!\\)%.*",
     r"\\begin\{(equation|align)\*?\}.*?\\end\{\1\*?\}",
@@ -41,7 +41,7 @@ _NOT_PROSE = [
 ]
 
 
-# Digits of a formula that are no quantity: indices and exponents, a factor of a symbol, a bound 0.
+# Digits of a formula that are no result: indices, exponents, factors of a symbol, a bound 0.
 _NOTATION = r"[_^](\{[^{}]*\}|.)|\d+(?=[a-zA-Z])|\\(ge|le)\s*0(?![.\d])"
 
 
@@ -60,7 +60,7 @@ def typed_numbers(source: str) -> list[str]:
 
 @pytest.mark.parametrize("document", OWN)
 def test_no_float_is_pending_where_a_long_table_of_another_study_begins(document):
-    """Such a table runs over the end of a page that also takes up a float."""
+    """A long table continues on the next page, where a float would also be placed."""
     pattern = r"(\\(picture|figure)of|\\begin\{(table|figure)\})(?s:.)*\\longtableof"
     text = OWN[document].rpartition(r"\begin{document}")[2]
     assert not any(re.search(pattern, part) for part in text.split(r"\clearpage"))
@@ -122,7 +122,7 @@ def test_every_number_is_a_column_of_a_table_and_is_cited():
     tables |= {name: pd.DataFrame(rows)[:0] for name, rows in facts.items()}
     for name, entry in NUMBERS.items():
         if entry.table != "machine":
-            number_of(name, NUMBERS, tables)  # which refuses others
+            number_of(name, NUMBERS, tables)  # which refuses other columns
     assert set(names_of(SOURCE + "".join(OWN.values()))) == set(NUMBERS)
 
 
@@ -142,7 +142,7 @@ def test_every_table_is_included_and_mentioned_in_the_text():
 
 
 def test_numbers_that_a_configuration_may_lack_stand_in_optional_blocks():
-    """Outside of them only what every configuration holds."""
+    """Text outside the blocks has only numbers that every configuration has."""
     blocks = [sentence.text for sentence in sentences(SOURCE)]
     outside = SOURCE
     for block in blocks:
@@ -154,7 +154,7 @@ def test_numbers_that_a_configuration_may_lack_stand_in_optional_blocks():
 
 
 def test_the_same_inputs_give_the_same_bytes_in_every_folder(tmp_path):
-    """An included PDF brings the name of its file along unless the preamble suppresses it."""
+    """An included PDF contains the name of its file unless the preamble suppresses it."""
     settings = [line for line in SOURCE.splitlines() if line.startswith(r"\pdf")]
     start = r"\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern,graphicx}"
     picture = r"\noindent\includegraphics[width=\textwidth]{picture.pdf}"

@@ -1,4 +1,4 @@
-"""Numbers of the manuscript: found by their entries, or refused with the reason."""
+"""Numbers of the manuscript are found by their entries or refused with the reason."""
 
 from pathlib import Path
 
@@ -51,7 +51,7 @@ def number(asked: Entry) -> tex.Number:
         (entry("method", "count", method=("!=deim", "!=x")), "2"),
         (entry("method", scene="!=bar_a", r="!=20"), "pod"),
         (entry("error", "count"), "3"),
-        (entry("finite", scene="b", r=20), "yes"),  # numpy.bool_, which is no bool
+        (entry("finite", scene="b", r=20), "yes"),  # numpy.bool_, which is not a bool
         (entry("finite", scene="bar_a", method="pod"), "no"),
         (entry("method", finite=False), "pod"),
         (entry("ranks", table="study"), "6, 10"),
@@ -96,7 +96,7 @@ def test_a_file_of_entries_is_read_and_its_faults_are_named(tmp_path: Path):
 def test_numbers_that_the_text_does_not_expect_are_listed(expect, met):
     asked = {"own": entry("error", scene="bar_a", method="deim", expect=expect)}
     assert (tex.unexpected(asked, TABLES) == {}) is met
-    missing = {"own": entry("error", scene="absent", expect=">= 1")}  # a part of the study
+    missing = {"own": entry("error", scene="absent", expect=">= 1")}  # only a part of the study
     assert tex.unexpected(missing, TABLES) == {}
 
 
@@ -135,10 +135,10 @@ HELD = {"runs": frame("scene method outcome error end", ("bar", "pod", "wrong", 
     ("asked", "held"),
     [
         (entry("error", scene="bar"), True),
-        (entry("end", scene="bar"), True),  # an empty cell of a run is held: none was found
+        (entry("end", scene="bar"), True),  # an empty cell of a run counts: no value was found
         (entry("error", scene="cloth"), False),
         (entry("error", "max", scene="cloth"), False),
-        (entry("error", "count", scene="bar", outcome="accurate"), True),  # none of them: a number
+        (entry("error", "count", scene="bar", outcome="accurate"), True),  # zero is a number, too
         (entry("error", "count", scene="cloth", outcome="accurate"), False),
     ],
 )

@@ -1,4 +1,4 @@
-"""Building PDFs: whole, the same bytes everywhere, and faults in one line."""
+"""Built PDFs are complete and have the same bytes everywhere; errors have one line."""
 
 import shutil
 
@@ -78,7 +78,7 @@ LINKED = r"""\documentclass{article}
 
 
 def linked(folder, end="End."):
-    """Two sources that refer to each other, and their PDFs."""
+    """Two sources that refer to each other, with their PDFs."""
     for own, other in (("main", "supplement"), ("supplement", "main")):
         text = LINKED % (other, other, own, other, end if own == "main" else "End.")
         (folder / f"{own}.tex").write_text(text)

@@ -136,7 +136,7 @@ TABLES = {
 }  # fmt: skip
 
 
-# Rows of each table; what they show stands above them.
+# Expected rows of each table, with their subject above them.
 MADE = r"""
 % verdicts with their colour, and the tests that decide; a place without a figure is a table
 % claims
@@ -233,7 +233,7 @@ PAGE = r"""\documentclass{article}\usepackage[T1]{fontenc}\usepackage{lmodern}\u
 @pytest.mark.parametrize("long", [False, True])
 @pytest.mark.parametrize("rows", [[], [["a", "1"]], [["a", "1"], ["b", "2"]]])
 def test_a_table_of_the_manuscript_is_typeset(long, rows, tmp_path):
-    """A table without rows is that of a configuration which holds nothing of what it shows."""
+    """A table without rows belongs to a configuration without the results that the table shows."""
     text = tabular(["name", "number"], rows, "lr", long)
     assert text.count(r"name & number \\") == (2 if long else 1)
     assert [line for line in text.splitlines() if line.startswith(("a &", "b &"))] == [

@@ -1,4 +1,4 @@
-"""Command lines, the files and folders that they name, and what is handed to Snakemake."""
+"""Command lines: the files and folders that they name, and the options for Snakemake."""
 
 import pytest
 
@@ -124,7 +124,7 @@ def test_a_name_that_is_no_folder_is_refused(name):
 
 def test_options_are_added_and_cores_unless_given():
     assert completed(["-n"]) == ["-n", "--cores", "all", *LINES, *OPTIONS]
-    # who asks for Snakemake's own output gets it
+    # Snakemake's output is shown if it is requested
     for option in ("--summary", "--verbose", "-p", "--quiet"):
         assert completed(["-n", option]) == ["-n", option, "--cores", "all", *OPTIONS]
     assert completed(["-j2"]) == ["-j2", *LINES, *OPTIONS]
@@ -161,7 +161,7 @@ def test_a_figure_may_stand_before_and_behind_options(asked):
         ("figure", ["figure ''", "allowed: 1, ", "preprint:1", "ladder"]),
         ("figure 99", ["figure '99'", "allowed: 1, "]),
         ("figure strain_run", ["figure 'strain_run'", "did you mean 'strain_runs'"]),
-        # a faulty file is named before Snakemake reads it
+        # a faulty file is named before Snakemake reads the file
         ("--configfile none.yaml", ["none.yaml"]),
         ("--configfile config", ["config: a folder"]),
     ],

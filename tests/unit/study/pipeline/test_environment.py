@@ -49,7 +49,7 @@ def test_requested_variables_are_kept():
     assert made["OPENBLAS_NUM_THREADS"] == "1"
 
 
-# as Linux prints them: a Haswell, a virtual machine that hides AVX2, and an ARM processor
+# as Linux prints them: Haswell, a virtual machine without AVX2, ARM
 CPUINFO = {
     "Haswell": "processor\t: 0\nflags\t\t: fpu sse4_2 avx f16c fma avx2 bmi2\n",
     "Nehalem": "processor\t: 0\nflags\t\t: fpu sse4_2 avx fma\n",
@@ -75,13 +75,13 @@ def test_kernels_are_the_newest_that_all_processors_support(system, machine, cpu
 
 
 def said(code: str, environment: dict[str, str]) -> list:
-    """What a program prints as JSON in an environment."""
+    """JSON output of a program in an environment."""
     command = [sys.executable, "-c", f"import json; {code}"]
     return json.loads(subprocess.run(command, env=environment, stdout=-1, check=True).stdout)
 
 
 def test_numpy_and_scipy_use_the_chosen_kernels():
-    """Set as a run sets them, both libraries report them."""
+    """With the variables of a run, both libraries report these kernels."""
     kernels = core_type(platform.system(), platform.machine(), features_here())
     if not kernels:
         pytest.skip("nothing to choose on this machine")
@@ -105,14 +105,14 @@ def test_a_processor_without_a_required_instruction_keeps_the_default_target(mis
 
 
 def test_kernels_are_compiled_for_the_chosen_processor():
-    """What numba says it compiled a kernel for, and keys its cache by, is what was chosen."""
+    """The target that numba reports, and by which it names its cache, is the chosen one."""
     target = compiled_for(platform.machine(), features_here())
     code = (
         "from pdrom.model.compiled.dots import dot; import numpy as np;"
         "dot(np.ones(3), np.ones(3)); library = dot.overloads[dot.signatures[0]].library;"
         "print(json.dumps(library.codegen.magic_tuple()[1:]))"
     )
-    # another processor: had the inherited name any effect, it would be seen
+    # the inherited name is another processor, so that an effect of it would show
     inherited = {**os.environ, "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
     name, features = said(code, settled(inherited, None, target))
     if target:

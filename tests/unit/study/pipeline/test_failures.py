@@ -30,7 +30,7 @@ def test_each_failed_job_is_named_with_its_error_or_the_message_of_snakemake(tmp
 
 
 def test_a_failed_batch_is_named_with_the_last_line_of_its_log(tmp_path):
-    """Of its jobs, only those are named that wrote an error."""
+    """Only the jobs of the batch that wrote an error are named."""
     failures = Failures()
     whole, failed = (tmp_path / name for name in ("3.log", "fom.log"))
     whole.write_text("Building DAG\nerror: *** JOB 3 ON n7 CANCELLED DUE TO TIME LIMIT ***\n")

@@ -1,6 +1,6 @@
-"""Fingerprints: what changes a result changes them, what does not leaves them alone.
+"""Fingerprints change with everything that can change a result, and with nothing else.
 
-And what a plan remembers: it is computed anew as soon as anything that it depends on changes.
+The memory of plans is computed again as soon as one of its dependencies changes.
 """
 
 import ast
@@ -86,7 +86,7 @@ THINGS = Registry("thing", {"own": "pdrom.here:Own", "other": "pdrom.there:Other
     ],
 )
 def test_fingerprints_ignore_registry_entries_of_other_modules(old, new, counts):
-    """Who asks for one lists it; entries for the module itself are its code."""
+    """Jobs list the entries that they need; entries of the module itself belong to its code."""
     assert old in REGISTRY
     edited = digest_of_source(REGISTRY.replace(old, new), "pdrom.here")
     assert (edited != digest_of_source(REGISTRY, "pdrom.here")) == counts
@@ -116,7 +116,7 @@ def test_an_unknown_module_is_named():
 
 
 def test_a_fingerprint_covers_what_its_modules_import_and_the_packages_around_it():
-    """An edit of their code or words: `workflow.test_snakefile`."""
+    """`workflow.test_snakefile` edits their code or words."""
     spring, bending = (f"pdrom.model.constraints.{name}" for name in ("spring", "bending"))
     found, more = (closure("study.experiments.fom", *added) for added in ((), (spring,)))
     around = {"pdrom.model.mesh.generators", "pdrom.core.store", "pdrom.model.constraints"}
@@ -126,7 +126,7 @@ def test_a_fingerprint_covers_what_its_modules_import_and_the_packages_around_it
 
 
 def command(path, *names: str) -> list[object]:
-    """What a new command gets that would compute 0 for each of ``names``."""
+    """Values that a new command finds; it would compute 0 for each of ``names``."""
     memory = Memory(path)
     found = [memory.get(lambda: 0, name, "same") for name in names]
     memory.save()
@@ -156,7 +156,7 @@ def test_a_changed_scene_is_built_again_and_the_warning_is_repeated(tmp_path, mo
     monkeypatch.setattr(scenes, "load_bound_scene", lambda *a: built.append(a) or build(*a))
 
     def vertices() -> int:
-        """Number of vertices that a new command finds; it warns of the side that it holds."""
+        """Number of vertices that a new command finds; it warns about the side that it fixes."""
         command = Memory(tmp_path / "plan.json")
         monkeypatch.setattr(scenes, "memory", lambda: command)
         caplog.clear()

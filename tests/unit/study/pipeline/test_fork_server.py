@@ -1,4 +1,4 @@
-"""Jobs that are forked from a server: they behave as scripts of a plain interpreter do."""
+"""Jobs that are forked from a server behave like scripts of a new interpreter."""
 
 import os
 import subprocess
@@ -69,7 +69,7 @@ print("a warning", file=sys.stderr)
 
 
 def test_a_forked_job_has_the_registered_types_of_numba(tmp_path):
-    """What else each process that loads a compiled function would import anew."""
+    """Otherwise each process that loads a compiled function would import these types again."""
     code = """
 import sys
 known = set(sys.modules)
@@ -123,8 +123,8 @@ begun.set()
     assert (tmp_path / "thread").read_text() == "done"
 
 
-# A job with a process of its own: both say that they are there, and hold a pipe that closes when
-# they are gone.
+# A job that starts a process: each reports that it runs, and holds a pipe that closes when
+# they have ended.
 WAITS = """
 import os, subprocess
 subprocess.run("echo $PPID; sleep 600", shell=True)
@@ -132,7 +132,7 @@ subprocess.run("echo $PPID; sleep 600", shell=True)
 
 
 def test_no_job_outlives_the_run(tmp_path):
-    """The pipe closes, though the process that the job has started does not know of the run."""
+    """The pipe closes, although the process that the job has started is unknown to the run."""
     owner = start(script(tmp_path, WAITS))
     owner.stdout.readline()
     owner.kill()

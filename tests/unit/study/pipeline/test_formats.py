@@ -1,4 +1,4 @@
-"""Files have the layout that docs/verification.md lists."""
+"""Files of results have the layout that docs/verification.md lists."""
 
 import os
 import re
@@ -103,7 +103,7 @@ def test_a_written_file_has_the_layout_of_the_page(pattern, files):
             shape, kind, unit = told[short]
             data = file[name]
             entries = shape.split(" x ")
-            # sizes that belong to one part of a file
+            # sizes of one part of a file
             local = {key: size for key, size in known.items() if key not in "stG"}
             pairs = zip(entries, data.shape, strict=True)
             expected = [value(entry, local, size) for entry, size in pairs]

@@ -1,4 +1,4 @@
-"""Beginning of a run; what git keeps of runs: times of jobs, and recorded verdicts."""
+"""Expected times at the beginning of a run; records of times and verdicts in git."""
 
 import re
 from pathlib import Path
@@ -25,7 +25,7 @@ from study.tables.claims.rules import load_claims
 
 TABLE = pd.read_csv(ROOT / COSTS).set_index("kind")
 PROFILE = yaml.safe_load((ROOT / "workflow/profiles/slurm/config.yaml").read_text("utf-8"))
-# What a job needs beside its own: two processes of Snakemake, each of which makes the plan, and the
+# Memory in addition to that of a job: two processes of Snakemake, each with the plan, and the
 # process that jobs are forked from.
 ABOVE_S, ABOVE_MB = 60.0, 1000
 # Factor for slower machines.
@@ -33,7 +33,7 @@ ROOM = 2.0
 
 
 def plan(**coarsen: float) -> SimpleNamespace:
-    """A plan, as far as it is asked."""
+    """A stub of a plan."""
     return SimpleNamespace(
         study=SimpleNamespace(root=ROOT, settings=SimpleNamespace(coarsen=Coarsen(**coarsen))),
         results="results/studies/logs",
@@ -55,7 +55,7 @@ def test_the_expected_time_of_a_job_is_that_of_its_kind_on_similar_meshes(log, k
     assert expected_seconds(plan())(place) == TABLE.seconds[kind]
     coarse = expected_seconds(plan(resolution=0.5))
     assert coarse(place) == TABLE.coarse_seconds[kind]
-    # a kind that was not measured takes the median
+    # a kind that was not measured has the median
     unknown = "results/studies/logs/logs/never_seen/a.log"
     assert expected_seconds(plan())(unknown) == TABLE.seconds.median()
 
@@ -99,7 +99,7 @@ def test_costs_are_read_from_the_logs_of_two_runs(tmp_path):
 @pytest.mark.parametrize("kind", TABLE.index)
 @pytest.mark.parametrize("attempt", [1, 2])
 def test_the_cluster_profile_requests_more_than_any_recorded_job_needed(kind, attempt):
-    """What the workflow calls by another name than the kind has the default request."""
+    """A rule whose name differs from its kind has the default request."""
     asked = PROFILE["default-resources"] | PROFILE["set-resources"].get(kind, {})
     memory, minutes = (eval(asked[key], {"attempt": attempt}) for key in ("mem_mb", "runtime"))
     assert memory >= attempt * (ABOVE_MB + TABLE.memory_mb[kind])

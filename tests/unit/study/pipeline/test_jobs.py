@@ -1,4 +1,4 @@
-"""What jobs get of a study, what makes them run again, and which files belong to it."""
+"""Settings of jobs, changes that rerun them, and the files of a study."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -61,7 +61,7 @@ def test_a_study_of_other_scenes_plans_only_files_of_its_scenes():
     }  # fmt: skip
     assert about_others & named == set()
     assert {"spring_runs", "bar_runs", "error_against_gain", "payoff", "tab_reruns"} <= named
-    # the full study and one that decides the claims on other scenes have everything
+    # the full study, and a study that decides the claims on other scenes, have all files
     for changes in ({}, {"scenes": ["ball_shell"], "claim_sets": {"sound_scenes": ["ball_shell"]}}):
         whole = Plan(Study(default | changes, ROOT), Folders("out"))
         assert {*whole.tables, *whole.figures} == {*declared(), *declarations()}
@@ -93,7 +93,7 @@ LIVE = "live: {scenes: [small]}\nsubspace: {scenes: [small], sizes: [2]}\n"
 
 
 def changed(root: Path, old: str, new: str) -> set[str]:
-    """Names of what is made again when one text of the scene's file is another one."""
+    """Names of the files that are made again if a text of the scene's file changes."""
 
     def jobs() -> dict[tuple, tuple]:
         plan = load_project(root)
@@ -115,7 +115,7 @@ def changed(root: Path, old: str, new: str) -> set[str]:
 
 
 def test_an_edit_of_a_scene_plans_the_jobs_that_read_or_print_it(tmp_path):
-    """A title the page of models alone, a weight the simulation."""
+    """A title reruns only the page of models, a weight the simulation."""
     root = make_project(tmp_path, {})
     (root / STUDY).write_text((root / STUDY).read_text() + LIVE)
     assert changed(root, "title: A small sheet", "title: Another one") == {"live"}

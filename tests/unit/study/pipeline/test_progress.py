@@ -1,4 +1,4 @@
-"""A run shows one line a job, with counts, share of the work and the time that is left."""
+"""A run prints one line for each job: counts, share of the work and remaining time."""
 
 import logging
 

@@ -1,4 +1,4 @@
-"""A run is alone in its folder; it ends at once, and wholly."""
+"""Only one run works in a folder; it ends at once and completely."""
 
 import os
 import signal
@@ -76,7 +76,7 @@ os.write(1, b'ready\\n')
 @pytest.mark.parametrize("number", ENDINGS)
 @pytest.mark.parametrize("ignores", [False, True])
 def test_a_signal_ends_a_run_with_one_line(number, ignores):
-    """Though sys.stderr is redirected; what nohup ignores stays ignored."""
+    """Even if sys.stderr is redirected; signals that nohup ignores stay ignored."""
     code = "import sys\nsys.stderr = None\n" + LEAVES + "sys.stdin.read()"
     if ignores:
         code = f"import signal\nsignal.signal({number:d}, signal.SIG_IGN)\n{LEAVES}"

@@ -1,4 +1,4 @@
-"""Studies: settings and defaults, scenes made out of others, and those that no subspace takes."""
+"""Studies: settings, defaults, derived scenes, and scenes that no subspace accepts."""
 
 import pytest
 import yaml
@@ -27,7 +27,7 @@ def test_short_runs_are_planned_where_the_study_holds_them():
     job = Plan(made).job(stability, {"scene": "strain_oop"})
     plain = job.settings["short"]
     assert plain["ranks"] == [6]
-    # which scenes have short runs and how they are judged makes no run again
+    # the choice of scenes with short runs, and their limits, rerun nothing
     assert not {"scenes", "wrong", "left", "departure"} & set(plain)
     assert labels_of(study(), paths.STABILITY) == []
 
@@ -41,7 +41,7 @@ def test_alternatives_run_on_small_and_on_large_scenes_of_the_study():
 
 @pytest.mark.parametrize("name", ["default", "tiny"])
 def test_the_configurations_contain_everything_that_they_request(name):
-    """Nothing in these two files is left out without a word."""
+    """Every entry of these two files is planned."""
     config = read_yaml(CONFIG / "default.yaml")
     if name == "tiny":
         tiny = read_yaml(CONFIG / "tiny.yaml")
@@ -53,7 +53,7 @@ def test_the_configurations_contain_everything_that_they_request(name):
 
 @pytest.fixture
 def root(tmp_path):
-    """A project with a scene of its own, in which wind blows."""
+    """A project with another scene, in which wind blows."""
     scene = read_yaml(CONFIG / "scenes" / "spring_oop.yaml") | {"name": "windy"}
     scene["effects"].append({"effect": "wind", "velocity": [1.0, 0.0, 0.0]})
     return make_project(tmp_path, {"config/scenes/windy.yaml": yaml.safe_dump(scene)})

@@ -1,4 +1,4 @@
-"""Names stand for files, a study's files lie in its own folder, misspelt ones get a suggestion."""
+"""Names stand for files, files of a study lie in its folder, wrong names get a suggestion."""
 
 import re
 from types import SimpleNamespace

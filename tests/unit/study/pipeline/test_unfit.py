@@ -1,4 +1,4 @@
-"""Results that are missing, damaged or those of another job: a plan names exactly these."""
+"""A plan names exactly the results that are missing, damaged or from another job."""
 
 import json
 import os
@@ -44,7 +44,7 @@ def made(study):
 
 @pytest.fixture
 def plan(made, study, tmp_path, monkeypatch):
-    """A copy of the folder that a test may damage, as the current folder, and its plan."""
+    """A copy of the folder that a test may damage, as the working folder, and its plan."""
     monkeypatch.chdir(shutil.copytree(made, tmp_path / "copy"))
     return Plan(study, Folders(RESULTS))
 
@@ -61,7 +61,7 @@ def unfit(plan: Plan) -> dict[str, str]:
 
 
 def flip(path: Path) -> None:
-    """Change one bit; size and date are the old ones."""
+    """Change one bit and keep size and date."""
     stat, content = path.stat(), bytearray(path.read_bytes())
     content[-9] ^= 1
     path.write_bytes(content)
@@ -104,7 +104,7 @@ DAMAGES = {
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_the_plan_names_the_damaged_file_and_its_reader_renames_it(damage, plan):
-    """Then it is made again; a run holds times, so that what follows is made again, too."""
+    """The file is made again, and so are the files that follow, because a run contains times."""
     assert unfit(plan) == {}
     do, fault = DAMAGES[damage]
     for name in (RUN, SNAPSHOT):
@@ -122,7 +122,7 @@ def test_the_plan_names_the_damaged_file_and_its_reader_renames_it(damage, plan)
 
 
 def test_results_of_another_run_of_older_code_or_of_other_inputs_are_noticed(plan):
-    """Each file has a valid checksum that tells where it comes from."""
+    """Each file has a valid checksum with its provenance."""
     heldout = HELDOUT.at(RESULTS, scene=SCENE)
     shutil.copy2(RUN, heldout)
     assert unfit(plan) == {heldout: FOREIGN}

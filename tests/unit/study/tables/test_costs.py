@@ -1,4 +1,4 @@
-"""Tables of break-even sizes, accurate runs that pay, and effects, against counts by hand."""
+"""Tables of break-even sizes, faster accurate runs, and effects, against counts by hand."""
 
 import numpy as np
 import pandas as pd
@@ -39,7 +39,7 @@ def test_every_row_has_its_break_even_size(tmp_path):
     np.testing.assert_allclose(
         table.solve_ratio + table.lift_ratio, table.ratio - 0.5 * offset / full
     )
-    # 1 + 0.1 r = 4; r = 30.5; never; it never pays; exactly at the last size
+    # 1 + 0.1 r = 4; r = 30.5; never; never faster; exactly at the last size
     assert table.breakeven_r.fillna(-1).tolist() == [*np.repeat([30, 31, -1, 5, 100], 5)]
 
 
@@ -48,7 +48,7 @@ KNOWN = {"reference_error": 0.0, "reference_deformation_error": None}  # the con
 
 
 def tables(runs) -> pd.DataFrame:
-    """Reruns of both motions; the number of the run is its size r."""
+    """Reruns of both trajectories; the number of the run is its size r."""
     rows = [
         (scene, "spring", method, "full", None, r, error, speedup, 1.0, held)
         for r, (scene, method, error, speedup, held) in enumerate(runs)
@@ -63,7 +63,7 @@ def tables(runs) -> pd.DataFrame:
 
 
 def paid(reruns, *fewer: tuple, shares: tuple = (), by: str = "position") -> pd.DataFrame:
-    """Table payoff of one measure, of full-order runs ``fewer`` and groups of ``shares``."""
+    """Table `payoff` of one measure, for full-order runs ``fewer`` and groups of ``shares``."""
     points = frame(f"scene method position_basis iterations {ERROR} ms_per_frame", *fewer)
     points = points.assign(deformation_error=points[ERROR], **KNOWN)
     made = payoff(reruns, points, frame("scene effect force_share", *shares))
@@ -87,7 +87,7 @@ def test_errors_are_those_of_the_fastest_accurate_run_or_of_the_most_accurate_ru
 
 
 def test_runs_that_are_faster_are_counted_on_the_test_trajectories():
-    """Accurate and fast, accurate and slow, and fast but off by more than a tenth held out."""
+    """Runs are accurate and fast, accurate and slow, or fast with a test error above 10 %."""
     runs = [("a", "deim", 0.01, 2.0, 0.05), ("b", "deim", 0.02, 0.5, 0.05)]
     reruns = tables([*runs, ("c", "deim", 0.05, 4.0, 0.2)])
     held = reruns[reruns.motion != "train"]
@@ -100,7 +100,7 @@ def test_runs_that_are_faster_are_counted_on_the_test_trajectories():
 
 
 def test_a_run_is_accurate_if_both_errors_and_the_error_of_the_reference_are_small():
-    """Scene a by position alone, c moves rigidly; b is known to a third of the limit, or half."""
+    """Scene a is accurate in position only, c moves rigidly; errors of b's reference are varied."""
     reruns = tables([(scene, "deim", 0.01, 2.0, 0.01) for scene in "abc"])
     reruns = reruns.assign(deformation_converged=[0.2, 0.05, None] * 2)
 
@@ -125,13 +125,13 @@ def test_effects_are_joined_in_one_time():
     table = effects_cost(costs, none, none, times, NO_RUNS, HORIZON)
     assert table.scene.tolist() == ["a", "a", "b", "b"]
     assert table.elements.tolist() == [3] * 4
-    # in scene b the effects add up to its one time; a was not timed in several processes
+    # in scene b the effects add up to its time; a was not timed in several processes
     assert table.ms_per_frame.tolist() == [2.0, 6.0, 0.75, 2.25]
     assert effects_cost(none, none, none, times, NO_RUNS, HORIZON).empty
 
 
 def test_contributions_cover_the_frames_before_the_horizon_and_have_times():
-    """Two frames count; bending moves less than the floor, the only group of b cannot go."""
+    """Two frames count; bending contributes less than the sensitivity, and b has only one group."""
     forces = (("a", "spring", 3.0), ("a", "bending", 1.0), ("b", "strain", 4.0))
     rows = [
         (scene, effect, "constraint group", number, force, energy)
@@ -183,7 +183,7 @@ def test_full_order_settings_are_compared_first_and_groups_without_force_ignored
     early += [("a", "coarser-mesh-anderson", "full", 5, 0.08, 1.5)]
     early += [(scene, "full", "full", 10, 0.01, ms) for scene, ms in (("a", 6.0), ("b", 4.0))]
     reruns = tables([("a", "deim", 0.01, 2.0, None), ("b", "deim", 0.01, 2.0, None)])
-    shares = [("a", "spring", 1e-3), ("b", "spring", 2e-3)]  # the former counts for nothing
+    shares = [("a", "spring", 1e-3), ("b", "spring", 2e-3)]  # the group of a does not count
     first, second, own = paid(reruns, *early, shares=shares).itertuples()
     assert (first.method, first.scenes, first.accurate) == ("fewer-iterations", 2, 1)
     assert (first.pays, first.best_speedup, first.heldout) == (1, 3.0, 0)

@@ -1,4 +1,4 @@
-"""Tables equal_error and frontier: opponents and best settings, worked out by hand."""
+"""Tables `equal_error` and `frontier`: comparisons and best settings, worked out by hand."""
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,7 @@ COLUMNS = (
     "method vertices iterations training_motions k skinning tolerance error_implicit ms_per_frame"
 )
 NO_MODEL = (None,) * 4
-# On the own mesh of 9 vertices and a coarser one of 4; without a time, what is not simulated.
+# On the mesh of 9 vertices and a coarser mesh of 4; rows that are not simulated have no time.
 RUNS = frame(
     COLUMNS,
     ("converged", 9, None, *NO_MODEL, 0.0, None),
@@ -27,7 +27,7 @@ RUNS = frame(
     ("coarser-mesh", 4, 2, *NO_MODEL, 0.05, 1.0),
     ("coarser-mesh-anderson", 4, 5, *NO_MODEL, 0.2, 1.5),
     ("ecsw", 9, 5, 1, 38, 0, 1e-2, 0.05, 0.5),
-    ("ecsw", 9, 5, 1, 20, 0, 1e-2, 0.1, 0.25),  # not the fixed setting, as the next four
+    ("ecsw", 9, 5, 1, 20, 0, 1e-2, 0.1, 0.25),  # not the fixed setting, as in the next four rows
     ("ecsw", 9, 10, 1, 38, 0, 1e-2, 0.04, 1.0),
     ("ecsw", 9, 5, 4, 38, 0, 1e-2, 0.03, 0.5),
     ("ecsw", 9, 5, 1, 38, 10, 1e-2, 0.03, 0.5),
@@ -86,7 +86,7 @@ def test_the_comparison_is_the_fastest_run_that_is_as_accurate(tmp_path):
     # 3 s of training; .75 ms saved a frame, the median of .5 and 1
     assert first.pays_after == pytest.approx(4000.0)
     assert pd.isna(slower.pays_after)
-    # no setting is as accurate: the most accurate one, which no playback and no reference is
+    # no setting is as accurate: the most accurate simulation, which is no replay and no reference
     found = exact[["same_method", "same_reached", "coarser_iterations", "coarser_error"]]
     assert found.tolist() == ["projective", False, 10, 0.01]
     blown = made(tmp_path, finite=lambda rows: ~rows.method.str.startswith("ecsw"))
@@ -104,13 +104,13 @@ def test_recorded_rows_of_other_meshes_follow_those_of_the_run(tmp_path):
         pd.concat([rows, rows.assign(factor=2.0)]).assign(recorded="2026").to_csv(record)
         both = again()
         assert both.groupby("factor").recorded.count().to_dict() == {1.0: 0, 2.0: len(rows)}
-    # what is recorded of the times is a table as well, which is not made again
+    # the record of the times is also a table, which is not made again
     assert set(equal_error(both, times, elements, []).factor) == {1.0}
     assert equal_error(table.assign(recorded="2026"), times, {}, []).empty
 
 
 def test_the_frontier_is_chosen_on_validation_trajectories(tmp_path):
-    """What is beaten, has no error, or takes its error from test trajectories is on no frontier."""
+    """Settings that are dominated, have no error, or were chosen on tests are omitted."""
 
     def finite(rows):
         return (rows.method != "ecsw") | (rows.iterations != 10)

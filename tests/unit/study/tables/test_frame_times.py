@@ -1,4 +1,4 @@
-"""Times over processes: intervals, what a control confirms, one time for each scene."""
+"""Times over processes: intervals, controls, and one time for each scene."""
 
 import numpy as np
 import pandas as pd
@@ -23,7 +23,7 @@ def test_the_interval_of_a_median_is_that_of_the_binomial_distribution():
 
 @pytest.fixture
 def measured() -> pd.DataFrame:
-    """Three processes: scene a with its twin and two reductions; the machine's speed varies."""
+    """Three processes of varying speed: scene a with its short variant and two reductions."""
     full, control = (("full", *5 * [None]), ("control", *5 * [None]))
     runs = frame(
         "scene role group method position_basis k r ms_per_frame",
@@ -45,7 +45,7 @@ def test_each_scene_has_one_time_and_one_control(measured):
     table = frame_times(measured).set_index("scene")
     assert table.ms_per_frame.to_dict() == {"a": 3.0, "a_twin": pytest.approx(3.3)}
     assert (table.processes == 3).all()
-    # the ratios do not see how fast the machine was
+    # the ratios do not depend on the speed of the machine
     assert table.control_ratio["a"] == pytest.approx(1.01)
     assert not table.control_agrees["a"]
     assert table.twin_ratio["a"] == pytest.approx(1.1)

@@ -1,4 +1,4 @@
-"""Tables about the gain and motions of the reruns, from small reruns, against values by hand."""
+"""Tables of DEIM constants and trajectories of small reruns, against values by hand."""
 
 import numpy as np
 import pandas as pd
@@ -8,7 +8,7 @@ from builders import frame
 from study.tables.errors import gain_interventions
 from study.tables.kit.results import KEYS, TRAIN, judged_runs, over_motions, trained, with_held_out
 
-# an error that is none: ended before
+# no error: the run ended before
 RUNS = frame(
     "scene method r relative_error gain elements_sampled frames",
     ("calm", "pod", 20, 1e-3, 1.0, 100, 50),
@@ -28,7 +28,7 @@ FLOORS = {"calm": 1e-8, "quiet": 1e-8, "wild": 1e-3, "hopeless": 1e-8}
 
 
 def tables() -> tuple[pd.DataFrame, pd.DataFrame]:
-    """reduced_reruns and reconstruction_error with what the two tables read."""
+    """Tables `reduced_reruns` and `reconstruction_error` with the columns that both tables read."""
     runs = RUNS.assign(group="spring")
     measured = runs.drop(columns="frames")
     splits = (("train", 1e-4 * runs.gain), ("test", 1.0))
@@ -55,13 +55,13 @@ def test_only_runs_with_a_sufficient_basis_count():
 
 
 def square(*runs: tuple) -> pd.DataFrame:
-    """Rows of the ladder's two by two: scene, rung, rows of an element, gain and error."""
+    """Rows of the two by two ablation: scene, step, rows of an element, constant and error."""
     names = "scene rung rows_per_element gain relative_error_within_horizon"
     return frame(names, *runs).assign(direction="square", group="spring", r=20)
 
 
 def test_samples_and_coefficients_are_exchanged_at_equal_entries():
-    """A scene and its twin are one family; elements of a single row are no other sample."""
+    """A scene and its short variant are one family; elements of one row are no other sample."""
     reruns, reconstruction = tables()
     runs = [
         (scene, rung, p, gain, error)
@@ -82,7 +82,7 @@ def test_samples_and_coefficients_are_exchanged_at_equal_entries():
     assert (shared.pairs, shared.scenes, shared.families, shared.families_fallen) == (3, 3, 2, 2)
     assert (shared.gain_ratio, shared.error_ratio, shared.p_value) == (0.05, 0.1, 0.5)
     elements = table.loc["whole elements, separate coefficients"]
-    # the gain falls tenfold and the error does not
+    # the constant falls tenfold and the error does not
     assert (elements.pairs, elements.families, elements.unexplained_share) == (2, 1, 1.0)
     # the four cells of coefficients by samples: elements of a single row count, too
     cells = table[["pairs", "failing", "failing_after", "error_before", "error_after"]].loc
@@ -96,11 +96,11 @@ def test_interventions_compare_runs_with_the_same_basis():
     table = gain_interventions(*tables(), square())
     assert set(table.mesh) == {"all", "sheets"}  # no group of tetrahedra ran
     table = table[table.mesh == "sheets"].set_index("step")
-    # block-deim ran in one scene only, where its gain and its error are below those of deim
+    # block-deim ran in one scene only, with constant and error below those of deim
     step = table.loc["whole elements for single entries"]
     assert (step.pairs, step.scenes, step.families_fallen) == (1, 1, 1)
     assert step.gain_ratio == pytest.approx(8.0 / 50.0)
-    assert (step.failing, step.rescued) == (1, 1)  # from half to a hundredth
+    assert (step.failing, step.rescued) == (1, 1)  # from 50 % to 1 %
     assert step.error_ratio == step.error_ratio_low == pytest.approx(0.02)
     assert step.p_value == 1.0
     assert "three elements a mode for one" not in table.index
@@ -122,11 +122,11 @@ def test_each_scene_counts_once_for_any_number_of_sizes():
     read = (runs.drop(columns="gain"), runs.assign(split="train"))
     step, ordered = gain_interventions(*read, square()).query("mesh == 'all'").itertuples()
     assert (step.pairs, step.scenes, step.families_fallen, step.families) == (49, 5, 3, 5)
-    # the gain falls everywhere, the error not in the two pairs of t and of w and in one of u
+    # the constant falls everywhere, the error not in the two pairs of t and of w and in one of u
     assert step.unexplained_share == pytest.approx(5 / 49)
     assert (ordered.step, ordered.pairs) == ("lower gain, shared coefficients", 49)
     assert step.error_ratio == 0.5
-    # sign test by hand, the tie of "w" counted as no fall: 2 (10 + 5 + 1) / 32
+    # sign test by hand; the tie of "w" counts as no fall: 2 (10 + 5 + 1) / 32
     assert step.p_value == pytest.approx(1.0)
     assert step.error_ratio_low < 0.5 <= step.error_ratio_high
 
@@ -144,7 +144,7 @@ def test_an_error_is_the_median_over_the_trajectories_that_can_be_judged():
         {"r": 10, error: None, "frames": 3, "blowup_frame": 3}, {"r": 10, error: 0.5},
         {"r": 10, error: 0.4}, {"r": 10, error: None, "horizon_frame": 0},
         {"r": 20, error: None, "frames": 0},
-        # playback meets the motion: it tests nothing
+        # replaying has no error here: no test
         {"r": 6, error: 0.9, "playback_error": 0.3},
         {"r": 6, error: 0.7, "motion": TRAIN}, {"r": 20, error: 0.8, "motion": TRAIN},
     ]  # fmt: skip

@@ -62,6 +62,6 @@ def test_every_mesh_size_is_measured(tmp_path, name):
     curves = [curve for _, curve in table.groupby(CURVE)]
     assert [curve.vertices.iloc[0] for curve in curves] == 2 * sizes
     for curve in curves:
-        # the largest size is the numerical rank, not what was asked for
+        # the largest size is the numerical rank, not the requested one
         assert curve.r.tolist()[:2] == [2, 3]
         assert 3 < curve.r.iloc[-1] < 1000

@@ -1,4 +1,4 @@
-"""Table stability: outcomes against their definition, one row for every run."""
+"""Table `stability`: outcomes against their definition, one row for every run."""
 
 import numpy as np
 import pandas as pd
@@ -57,7 +57,7 @@ def test_every_run_has_one_row_with_its_outcome(tmp_path):
     assert (full.energy_ratio == 1.0).all()
     keys = ["experiment", "scene", "h", "stiffness_ratio", "method", "position_basis", "k", "r"]
     assert not table.duplicated(keys).any()
-    # errors are those within the horizon
+    # errors cover the frames within the horizon
     rerun = table[(table.experiment == "rerun") & (table.method == "deim")]
     assert rerun.relative_error.tolist()[0] == 0.05
     assert rerun.relative_error.isna().tolist() == [False, True, True]
@@ -72,7 +72,7 @@ def test_every_run_has_one_row_with_its_outcome(tmp_path):
     ("finite", "extent", "error", "expected"),
     [
         (None, 3.0, 0.5, "not run"),
-        (0.0, 3.0, 0.5, "blow-up"),  # numbers: of runs that have gaps
+        (0.0, 3.0, 0.5, "blow-up"),  # columns of numbers with missing values
         (False, 3.0, None, "blow-up"),
         (True, 2.5, None, "left the scene"),
         (1.0, 2.4, None, "not judged"),

@@ -55,7 +55,7 @@ SERIES = {
 
 
 def write_both(path, rows: list[dict]) -> None:
-    """Write the rows of runs of the training motion, and the same of a held-out one."""
+    """Write the rows of runs of the training trajectory, and the same rows of a test trajectory."""
     write_table(pd.DataFrame(rows), f"{path}.csv")
     write_table(pd.DataFrame(rows).assign(motion="heldout"), f"{path}_heldout.csv")
 
@@ -71,13 +71,13 @@ def store_series(run, difference):
 
 @pytest.fixture
 def files(tmp_path) -> dict[str, object]:
-    """What reduced_reruns reads: reruns of scene a and b, subspace runs of b, and their timings.
+    """Inputs of `reduced_reruns`: reruns of scene a and b, subspace runs of b, and their timings.
 
-    Scene a leaves the threshold in frame 2 (held out: 1), scene b never does.
+    Scene a leaves the threshold in frame 2 (test trajectory: 1), scene b never does.
     """
     reruns = []
     cases = {
-        # differences of each run by frame; short ones blew up
+        # differences of each run by frame; short runs diverged
         "a": {6: [0.1, 0.2, 9.0, 9.0], 10: [0.5], 20: None},
         "b": {6: [0.1, 0.1, 0.1, 0.1], 10: [0.2, 0.2]},
     }
@@ -177,7 +177,7 @@ def test_errors_of_positions_shapes_and_velocities_cover_the_frames_before_the_h
     assert table.error_over_extent[[3, 5]].tolist() == pytest.approx([0.05, 0.1])
     assert table.error_over_extent[[1, 2, 4]].isna().all()
     np.testing.assert_allclose(table.shape_error, table.error_over_extent / 10.0)
-    # over the frames before the horizon, too: three times the difference over half the norm
+    # also over the frames before the horizon: three times the difference over half the norm
     np.testing.assert_allclose(table.velocity_error, 6.0 * table.relative_error_within_horizon)
     others = ["deformation_error", "error_converged", "deformation_converged"]
     within = table.relative_error_within_horizon.to_numpy()[:, None]
@@ -221,7 +221,7 @@ def test_runs_of_a_test_trajectory_are_judged_up_to_its_horizon(files):
     played = table[table.method == PLAYBACK].set_index(["motion", "scene"])
     assert played.relative_error.tolist() == pytest.approx([0.5] * 6)
     assert played.playback_error["heldout"].to_dict() == pytest.approx({"a": 0.5, "b": 0.5})
-    assert played.playback_error["kick"].isna().all()  # nobody perturbed that motion
+    assert played.playback_error["kick"].isna().all()  # no run perturbed that trajectory
     names = ["deformation_error", "error_converged", "deformation_converged"]
     assert played.loc[("heldout", "a"), names].tolist() == [0.4, 0.3, 0.2]
     table = table[(table.motion != TRAIN) & (table.method != PLAYBACK)].reset_index(drop=True)
@@ -230,12 +230,12 @@ def test_runs_of_a_test_trajectory_are_judged_up_to_its_horizon(files):
     assert set(table.motion) == {"heldout"}
     assert table.relative_error_within_horizon[0] == pytest.approx(0.1)
     assert table[["ms_per_frame", "speedup"]].isna().all(axis=None)
-    # it blew up in frame 1, which is behind the horizon
+    # it diverged in frame 1, which is after the horizon
     assert table.relative_error_within_horizon[1] == pytest.approx(0.5)
 
 
 def sweep(**changes) -> pd.DataFrame:
-    """Scene a with K = 2, 10 (its own) and 40, and a coarser mesh, all or with ``changes``."""
+    """Scene a with K = 2, 10 (its default) and 40, and a coarser mesh, all or with ``changes``."""
     rows = [
         {"iterations": k, "window": w, "vertices": n, "mesh_error": m,
          "error_converged": e, "deformation_converged": 3.0 * e}
@@ -248,12 +248,12 @@ def sweep(**changes) -> pd.DataFrame:
 
 
 def points(files, runs, other) -> pd.DataFrame:
-    """The table accuracy_cost of these runs, with those of ``other`` iterations."""
+    """Table `accuracy_cost` of these runs, with those of ``other`` iterations."""
     return accuracy_cost(runs, files["timings"], NOT_TIMED, other, {"a": 10, "b": 20})
 
 
 def test_accuracy_cost_compares_all_runs_with_the_converged_one(files):
-    """The run of the scene's iterations is there twice; 40 iterations lose to acceleration."""
+    """The run with the scene's iterations occurs twice; acceleration beats 40 iterations."""
     table = points(files, reduced_reruns(**files), sweep())
     columns = ["scene", "method", "iterations", "vertices", "ms_per_frame", "pareto"]
     assert list(table[columns].itertuples(index=False, name=None)) == [

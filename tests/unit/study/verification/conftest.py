@@ -32,13 +32,13 @@ def subject():
 
 @pytest.fixture(scope="session")
 def tracked():
-    """Expected tables of the tiny study as they are kept; a new one may have none yet."""
+    """Tracked expected tables of the tiny study; a new table may have none yet."""
     read = read_references(ROOT / folder_of(RESULTS))
     return {name: reference.frame for name, reference in read.items()}
 
 
 def timed(table, frame):
-    """A table with numbers in place of times, which references do not have."""
+    """A table with numbers instead of times, which references do not contain."""
     rows = np.arange(len(frame))
     columns = [c.name for c in table.columns if c.timed and c.kind == "number"]
     return frame.assign(**{name: 0.5 + (7 * rows + i) % 11 for i, name in enumerate(columns)})
@@ -75,7 +75,7 @@ def project(tracked, subject, tmp_path_factory):
 
 
 def derived_tables():
-    """Tables that are made from others, these first."""
+    """Tables that are made from other tables, inputs first."""
     reads = {name: table.reads.values() for name, table in declared().items()}
     graph = {name: [r.name for r in own if isinstance(r, TableOf)] for name, own in reads.items()}
     return filter(is_derived, TopologicalSorter(graph).static_order())
@@ -96,7 +96,7 @@ def results(project, monkeypatch):
 
 @pytest.fixture(scope="session")
 def expected(project, subject):
-    """Expected tables by name, all their columns among them, and what they say of each other."""
+    """Expected tables by name, with all their columns, and statements about each other."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(project)
         examination = Examination(subject)
@@ -105,7 +105,7 @@ def expected(project, subject):
 
 @pytest.fixture
 def examination(results, subject, expected):
-    """An examination of the results as they are when it is asked."""
+    """An examination of the results at the time of each question."""
     found = Examination(subject)
     found.expected, found.context = expected
     return found

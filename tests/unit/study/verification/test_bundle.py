@@ -1,4 +1,4 @@
-"""The archive for publication: what is in it, equal bytes, and what an unfinished study says."""
+"""The archive for publication: its contents, equal bytes, and the error of an unfinished study."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ from study.verification.subject import Status, Subject
 
 
 def git(folder, *arguments: str) -> None:
-    """A command of git that needs no settings of the user."""
+    """Run a command of git that needs no settings of the user."""
     who = {
         f"GIT_{role}_{key}": "a@b" for role in ("AUTHOR", "COMMITTER") for key in ("NAME", "EMAIL")
     }

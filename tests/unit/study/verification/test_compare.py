@@ -1,4 +1,4 @@
-"""Changes beyond the tolerances are noticed, differences between machines are not."""
+"""Changes beyond the tolerances are noticed; differences between machines are accepted."""
 
 import re
 

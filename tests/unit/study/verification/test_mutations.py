@@ -38,7 +38,7 @@ def test_expected_tables_agree_with_themselves_and_most_of_their_cells_are_stabl
 
 
 def judged(good, column):
-    """Whether the column has enough cells, and more of numbers than estimates or small counts."""
+    """Whether the column has enough cells, mostly numbers other than estimates or small counts."""
     cells = good.e[column.name]
     if column.kind in WORDS:
         return cells.notna().sum() > max(3, len(cells) / 3)
@@ -66,7 +66,7 @@ def test_columns_of_larger_numbers_other_words_and_empty_cells_are_noticed(chang
 
 
 def test_changed_labels_and_parameters_are_noticed(expected):
-    """Each column of them in a row of its own."""
+    """Each of these columns is changed in a separate row."""
     lost = []
     for good in expected:
         edited = good.e.astype(object)

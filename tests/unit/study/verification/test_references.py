@@ -1,4 +1,4 @@
-"""Expected tables: what is kept, how it is packed, and who may change it."""
+"""Expected tables: contents, compression, and conditions of an update."""
 
 import pandas as pd
 import pytest

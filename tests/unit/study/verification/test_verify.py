@@ -1,6 +1,6 @@
 """``./reproduce verify`` on a folder of results: outcomes, exit codes, the page.
 
-And edits of tables, with new checksums, that a sceptic tries: each is noticed.
+Edits of tables with new checksums, as a sceptic would try them, are noticed.
 """
 
 import json
@@ -56,7 +56,7 @@ def test_a_verdict_changed_by_times_is_shown_and_does_not_fail(examination):
 
 @pytest.fixture
 def not_made_again(monkeypatch):
-    """Tables are not computed from others, which takes most of the time."""
+    """Skip computing tables from other tables, which takes most of the time."""
     monkeypatch.setattr(Examination, "outdated", lambda self, name: False)
 
 
@@ -80,7 +80,7 @@ def test_missing_results_have_a_distinct_exit_code_and_name_the_command(results,
 
 
 def test_the_exit_code_is_that_of_the_worst_outcome():
-    """Of more and more outcomes, each worse than those before it."""
+    """Each further outcome is worse than those before it."""
     order = "REPRODUCED", "NOT_COMPARABLE", "NO_REFERENCE", "DIFFERS", "MISSING"
     lines = [Line("table", "a", Outcome[name]) for name in order]
     assert [status_of(lines[:count]) for count in range(1, 6)] == [0, 0, 3, 3, 4]
@@ -100,13 +100,13 @@ def test_an_update_writes_every_table_and_notes_the_reason(results, subject, mon
 
 
 def test_tables_that_a_run_would_make_again_are_not_expected(results, subject):
-    """No job of this plan has written the tables at hand."""
+    """No job of this plan has written the present tables."""
     with pytest.raises(StorageError, match=r"results/.*: settings or code have changed; run"):
         update(subject, "a new method")
     assert not (folder_of(RESULTS) / LOG).exists()
 
 
-# Table, its edit, and the line in which it is to be noticed, where not that of the table. Edits of
+# Table, its edit, and the line that must report the edit, if not that of the table. Edits of
 # rows and columns: test_mutations.py.
 EDITS = {
     "a column is left out": ("ladder", lambda f: f.drop(columns="gain")),

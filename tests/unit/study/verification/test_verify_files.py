@@ -1,4 +1,4 @@
-"""`verify --files`: changed, lost, unlisted, foreign files, and others than their inputs give."""
+"""`verify --files`: changed, missing, unlisted and foreign files, and files of other inputs."""
 
 import json
 from pathlib import Path
@@ -137,7 +137,7 @@ def no_manifest(content, _):
 STUDY = "./reproduce --configfile 'my study.yaml'"
 AGAIN = f"run {STUDY}\n"
 RUN = f"; every successful run writes it, run {STUDY}\n"
-# Change, what it changes, what is said of it.
+# Change, changed file, text of the report.
 FAULTS = (
     (flipped, NAMES, f"NAME: damaged (its checksum differs); {AGAIN}3 of 4 files"),
     (flipped_before_a_later_run, NAMES[:1], "NAME: damaged"),
@@ -167,7 +167,7 @@ def test_a_faulty_file_is_noticed_and_the_command_is_named(change, name, said, m
 
 
 def test_outputs_with_the_same_name_are_distinguished():
-    """A page of the article has the name of a table's page in a folder of its own."""
+    """A page of the article has the name of a table's page in another folder."""
     paths = {"page": "results/article/a.html", "other": "results/article/tables/a.html"}
     job = Job(PAGES, {}, {}, paths, {}, "", "")
     job.make(paths)

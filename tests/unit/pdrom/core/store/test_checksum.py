@@ -86,7 +86,7 @@ def flipped(content: bytes, bit: int) -> bytes:
 
 
 def damages(content: bytes) -> Iterator[bytes]:
-    """The content with an overwritten end, cut, with a line removed or repeated, with more bytes."""
+    """The content with overwritten end, cut, with a line removed or repeated, with bytes added."""
     for count in (1, 512, 4096):
         kept = content[: max(0, len(content) - count)]
         yield from (kept.ljust(len(content), filler) for filler in (b"\0", b"\xff"))

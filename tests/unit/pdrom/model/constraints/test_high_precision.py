@@ -1,7 +1,6 @@
 """Compiled projections of hard matrices agree with their definitions in mpmath.
 
-Where the nearest point is not unique, the test compares its distance and requires that it lies on
-the manifold.
+If the nearest point is not unique, the distance is compared, and p must lie on the manifold.
 """
 
 import math
@@ -200,10 +199,8 @@ CURVED = {
 
 @pytest.mark.parametrize("state", CURVED)
 def test_projections_of_bending_are_accurate(state, rng):
-    """Condition number: the terms that cancel in H = row y over |H|.
-
-    For H on the wrong side also over the distance of its direction from the opposite pole.
-    """
+    """Condition number: the terms that cancel in H = row y over |H|, for H on the wrong side over
+    the distance of its direction from the opposite pole."""
     mesh, kind = cloth(6, 6, "xz", wave=0.1), EFFECTS.load("bending")
     group = kind(kind.Config(weight=1.0), mesh, np.ones(mesh.vertices)).for_run()
     y = CURVED[state](mesh.points, rng)

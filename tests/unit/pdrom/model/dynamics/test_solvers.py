@@ -93,10 +93,8 @@ def test_masses_below_rounding_errors_are_refused_unless_the_body_is_fixed(name)
 
 
 def test_anderson_residuals_are_those_of_gmres(rng):
-    """With an unlimited window, step m + 1 is the image of the m-th iterate of GMRES.
-
-    Reference: dense least squares over the Krylov space, for a symmetric contraction.
-    """
+    """With an unlimited window, step m + 1 is the image of the m-th iterate of GMRES, computed by
+    dense least squares over the Krylov space of a symmetric contraction."""
     q, _ = np.linalg.qr(rng.standard_normal((12, 12)))
     matrix = q * np.linspace(0.3, 0.95, 12) @ q.T
     shift = np.repeat(rng.standard_normal((12, 1)), 3, axis=1)

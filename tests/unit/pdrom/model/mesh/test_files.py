@@ -1,4 +1,4 @@
-"""Mesh files: which are read, and how the process that reads them may end."""
+"""Mesh files that are read or refused, and the ways in which the reading process may end."""
 
 import subprocess
 from pathlib import Path
@@ -33,9 +33,9 @@ def replaced(monkeypatch: pytest.MonkeyPatch, script: str) -> None:
 
 @pytest.mark.parametrize("suffix", [".obj", ".vtu"])
 def test_a_mesh_file_is_read_in_any_folder(tmp_path, suffix):
-    """By the reader's process, also where the path holds a blank and letters beyond ASCII.
+    """By the reading process, also if the path has a blank and letters beyond ASCII.
 
-    It starts a process; without one `test_guards` reads all formats.
+    This test starts a process; `test_guards` reads all formats without one.
     """
     folder = tmp_path / "Étude du maillage"
     folder.mkdir()
@@ -46,7 +46,7 @@ def test_a_mesh_file_is_read_in_any_folder(tmp_path, suffix):
 
 
 def test_readers_of_meshes_open_no_second_file(tmp_path, monkeypatch):
-    """Neither of files beside the mesh nor of those that the mesh names."""
+    """They open neither files next to the mesh nor files that the mesh names."""
     contents = {}
     for suffix in reader.READERS:
         write_mesh(tmp_path / f"mesh{suffix}")
@@ -60,7 +60,7 @@ def test_readers_of_meshes_open_no_second_file(tmp_path, monkeypatch):
 
 
 def test_a_mesh_file_that_takes_too_long_is_refused(square, monkeypatch):
-    """The limit of processor time ends the process that reads it."""
+    """The limit of processor time ends the reading process."""
     limited(monkeypatch, seconds=1)
     replaced(monkeypatch, "import resource\nresource.setrlimit(0, (1, 1))\nwhile True:\n    pass")
     with pytest.raises(MeshError, match=r"square\.obj: .*(1 s of processor time|signal 9)"):
@@ -119,7 +119,7 @@ def test_an_unchanged_mesh_file_is_read_once(square, monkeypatch):
     )
     first, again = read_mesh_file(square), read_mesh_file(square)
     assert len(started) == 1
-    first.points[0] = 7.0  # what one caller does to its mesh is not seen by the next
+    first.points[0] = 7.0  # the next caller does not see changes that a caller makes to its mesh
     assert again.points[0].tolist() == read_mesh_file(square).points[0].tolist() == [0.0, 0.0, 0.0]
     square.write_text(SQUARE.replace("v 0 0 1", "v 0 0 2"))
     assert read_mesh_file(square).points[3].tolist() == [0.0, 0.0, 2.0]

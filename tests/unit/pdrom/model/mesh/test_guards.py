@@ -1,4 +1,4 @@
-"""Files by other writers: whole ones are read exactly, cut ones are refused or hold all cells."""
+"""Complete mesh files of other programs are read exactly; cut files are refused or complete."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from mesh_files import VOLUMES, read_here, refusal, write_mesh
 
 # as in the reader's process
 pytestmark = pytest.mark.filterwarnings("ignore")
-# meshio's writer, the extension, and what the writer is told
+# meshio's writer, the extension, and options of the writer
 VARIANTS = [
     ("gmsh", ".msh", {}), ("gmsh", ".msh", {"binary": False}), ("gmsh22", ".msh", {}),
     ("gmsh22", ".msh", {"binary": False}), ("medit", ".mesh", {}), ("obj", ".obj", {}),
@@ -28,7 +28,7 @@ def test_complete_files_are_exact_and_cut_files_are_refused(tmp_path, writer, su
     mesh = write_mesh(path, kind, writer, **more)
     cells = mesh.tetrahedra if kind == "tetra" else mesh.triangles
     found, listed = read_here(path)
-    if writer == "stl":  # it holds no numbers, but the corners of each triangle
+    if writer == "stl":  # an .stl file repeats the corners of each triangle
         corners = mesh.points[cells].astype(np.float32)
         assert np.array_equal(found[listed].astype(np.float32), corners)
     else:
@@ -45,7 +45,7 @@ def test_complete_files_are_exact_and_cut_files_are_refused(tmp_path, writer, su
             continue
         points, cells = read_here(path)
         assert np.array_equal(points, found), cut
-        # nothing in an .obj says how much there is: a cut between lines of faces is not noticed
+        # an .obj file has no counts: a cut between two lines of faces is not noticed
         between = suffix == ".obj" and content[cut - 1 : cut + 1].count(b"\n")
         assert np.array_equal(cells, listed[: len(cells)]), cut
         assert len(cells) == len(listed) or between, cut

@@ -1,4 +1,4 @@
-"""The mesh files of the replication are what their script writes."""
+"""The script of the replication's mesh files writes exactly these files."""
 
 import runpy
 import sys

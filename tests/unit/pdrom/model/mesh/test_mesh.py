@@ -27,7 +27,7 @@ def test_cloth_has_the_counts_of_the_study():
     assert mesh.points.mean(axis=0) == pytest.approx([0.0, 2.0, 0.0])
     # cell (0, 0): ll, ur, ul and ll, lr, ur
     assert mesh.triangles[:2].tolist() == [[0, 21, 1], [0, 20, 21]]
-    # triangles face one way and tile the sheet
+    # triangles have the same orientation and tile the sheet
     mesh = cloth(5, 7)
     a, b, c = (mesh.points[mesh.triangles[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
@@ -91,7 +91,7 @@ def test_the_smaller_number_of_inconsistent_triangles_is_reversed(triangles, see
 
 
 def test_a_strip_with_one_side_is_refused():
-    """Möbius' strip of six triangles: the ends of a strip are joined with half a turn."""
+    """Möbius' strip of six triangles: the ends of a strip are joined after half a turn."""
     strip = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4], [4, 5, 1], [5, 0, 1]])
     with pytest.raises(MeshError, match=r"strip: the surface around triangle 0 .* one side only"):
         turned_alike(Mesh(np.zeros((6, 3)), strip), "strip")
@@ -125,7 +125,7 @@ def test_slivers_and_cells_of_any_size_are_not_refused(sliver, corners):
      ("bar", "tetrahedron_strain"), ("bar", "deformation_gradient")],
 )  # fmt: skip
 def test_distorted_meshes_are_at_rest_in_their_rest_shape(shape, effect, data):
-    """S at rest projects on itself: the elastic force vanishes for any mesh."""
+    """S at rest projects to itself: the elastic force vanishes for any mesh."""
     mesh = data.draw(wild_meshes(shape))
     scene = build(mesh, {"effect": effect, "weight": 1.0}, frames=1)
     group, points = scene.groups[0].for_run(), scene.mesh.points
@@ -159,7 +159,7 @@ def test_reversed_cells_are_reordered_and_reversed_triangles_are_reported(tmp_pa
 @pytest.mark.parametrize("joined", [False, True], ids=["two components", "joined in one vertex"])
 @pytest.mark.parametrize("effect", ["spring", "strain", "bending"])
 def test_a_mesh_of_separate_parts_is_accepted(tmp_path, joined, effect):
-    """Two sheets rest where nothing pulls, and move where something does."""
+    """Without forces two sheets stay at rest; with a force on one, it moves."""
     other = SHEET.points + (1.0 if joined else 1.5) * np.array([1.0, 0.0, 1.0])
     # the last vertex of the first sheet may be the first of the second
     points = np.vstack([SHEET.points, other[joined:]])

@@ -1,4 +1,4 @@
-"""Ordinary mesh files, as programs write them: their points and cells exactly, or a line."""
+"""Mesh files as other programs write them: exact points and cells, or an error in one line."""
 
 from pathlib import Path
 
@@ -64,7 +64,7 @@ def test_faces_of_an_obj_file_are_read(tmp_path, content):
         (V + "l 1 2 3 4\n", "only lines or points, which are not simulated"),
         ("f -3 -2 -1\nv 0 0 0\nv 1 0 0\nv 1 0 1.5", "truncated: .* incomplete"),
         (V + "f 1 2 3 \\\n", "faces: something other"),
-        # of a polygon after a triangle and a quadrilateral: it ends at no edge of another face
+        # a cut in a polygon that follows a triangle and a quadrilateral
         (V + "v 2 0 0\nv 2 0 1\nf 1 2 3\nf 1 2 3 4\nf 1 2 5 6", "truncated"),
     ],
 )
@@ -86,7 +86,7 @@ def ply(head: str, rows: str | bytes, order: str = "ascii") -> bytes:
 def binary_ply(
     counts: str, order: str = "<", after: int = 0, index: str = "vertex_indices"
 ) -> bytes:
-    """With this type of the counts of corners, and some bytes and an edge behind the faces."""
+    """Binary PLY with this type of corner counts, and some bytes and an edge after the faces."""
     kinds = {"uchar": "u1", "ushort": "u2", "int16": "i2"}
     faces = np.zeros(2, [("n", order + kinds[counts]), ("at", f"{order}u4", 3), ("", f"V{after}")])
     faces["n"], faces["at"] = 3, TRIANGLES
@@ -114,7 +114,7 @@ NODES = "1 0 0 0\n2 1 0 0.1\n3 1 .25 1\n4 0 0.5 1e-3\n"
 
 
 def gmsh4(version: str) -> str:
-    """Format 4.0 as Gmsh writes it, which calls it 4."""
+    """Format 4.0 as Gmsh writes it, with the version number 4."""
     return (
         f"$MeshFormat\n{version} 0 8\n$EndMeshFormat\n$Nodes\n1 4\n1 2 0 4\n{NODES}$EndNodes\n"
         "$Elements\n1 2\n1 2 2 2\n1 1 2 3\n2 1 3 4\n$EndElements\n"
@@ -182,7 +182,7 @@ def test_other_cells_and_formats_are_refused(tmp_path, name, content, why):
 
 
 def medit(axes: int, vertices: list, **sections: list) -> str:
-    """A .mesh of these sections, with a reference behind each row."""
+    """A .mesh file of these sections, with a reference number at the end of each row."""
     text = f"MeshVersionFormatted 2\nDimension\n{axes}\n"
     for name, rows in {"Vertices": vertices, **sections}.items():
         lines = "".join(" ".join(map(str, row)) + " 7\n" for row in rows)
@@ -213,7 +213,7 @@ def test_a_mesh_of_the_plane_lies_at_z_0(tmp_path):
 
 
 def test_strings_of_a_binary_vtk_are_left_out(tmp_path):
-    """Each stands behind its length, in one byte or in two."""
+    """A string follows its length, which has one byte or two."""
     mesh, path, grid = write_mesh(tmp_path / "a.vtk"), tmp_path / "a.vtk", b"UNSTRUCTURED_GRID\n"
     field = b"FIELD f 1\nnames 1 2 string\n\xc2ab\x80\x40" + 64 * b"c" + b"\n"
     path.write_bytes(path.read_bytes().replace(grid, grid + field))

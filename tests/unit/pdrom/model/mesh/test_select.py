@@ -1,4 +1,4 @@
-"""Selections: each picks what a loop over the vertices picks, and faults name key and value."""
+"""Selections equal those by a loop over the vertices; errors name key and value."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_the_nearest_vertices_of_a_point_are_selected(point):
     five = chosen({"kind": "nearest", "point": near.tolist(), "count": 5})
     distance = np.linalg.norm(SHEET.points - near, axis=1)
     assert distance[five].max() <= np.delete(distance, five).min() + 1e-9
-    # of equally near vertices the first
+    # the first of equally near vertices
     square = cloth(3, 3, "xz")
     assert chosen({"kind": "nearest", "point": [0, 2, 0], "count": 2}, square) == [1, 4]
 

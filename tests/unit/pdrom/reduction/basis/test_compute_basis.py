@@ -1,4 +1,4 @@
-"""Bases of snapshots: every ingredient, and hard input."""
+"""Bases of snapshots: every ingredient, and degenerate input."""
 
 import itertools
 
@@ -77,7 +77,7 @@ def test_per_axis_layout_is_three_separate_pods():
 
 
 def published_modes(p: np.ndarray, signs: np.ndarray) -> np.ndarray:
-    """The recipe written out with a dense SVD: divide by the deviation, POD, multiply, add, QR."""
+    """The published recipe with a dense SVD: divide by the deviation, POD, multiply, add, QR."""
     matrix = p.reshape(len(p), -1).T
     first = matrix[:, 0]
     deviation = np.std(matrix - first[:, None])
@@ -119,7 +119,7 @@ def test_the_mean_among_the_modes_gives_another_space_for_other_signs():
 
 @every_spec
 def test_tiny_and_huge_snapshots_have_the_basis_of_ordinary_ones(spec):
-    """Squares of their entries underflow or overflow; a power of two changes no digit."""
+    """Squares of the entries underflow or overflow; scaling by a power of two changes no digit."""
     p, mass = snapshots(23)
     basis = basis_of(p, spec, roundoff=1e-4, mass=mass)
     for unit in (2.0**-1000, 2.0**660, 2.0**1015):
@@ -138,7 +138,7 @@ def test_tiny_and_huge_snapshots_have_the_basis_of_ordinary_ones(spec):
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("weighting", WEIGHTINGS)
 def test_constant_snapshots_have_a_mean_and_no_modes(weighting, layout, seed, n, exponent):
-    """What a computed mean leaves is round-off, for every number of snapshots and every scale."""
+    """Only rounding errors remain after subtracting the mean, for every number and every scale."""
     one, mass = snapshots(seed, 1)
     p = np.repeat(one, n, axis=0) * 10.0**exponent
     for centring in ("affine", "mean-in-modes"):

@@ -24,7 +24,7 @@ def matrix_of(shape: tuple[int, int, int]) -> np.ndarray:
 
 @given(SHAPES)
 def test_modes_and_singular_values_are_those_of_a_dense_svd(shape):
-    """Orthonormal, of the matrix's own span, with positive largest entries; input is kept."""
+    """Modes are orthonormal and span the columns, with positive largest entries; input is kept."""
     matrix = matrix_of(shape)
     before = matrix.copy()
     u, sigma = pod(matrix)
@@ -78,7 +78,7 @@ EPS = np.finfo(float).eps
         ([3.0, 2.0, 1.0], (10, 3), 0.0, 3),
         ([3.0, 2.0, 1.0], (10, 3), 1.5, 2),
         ([3.0, 2.0, 1.0], (10, 3), 5.0, 0),
-        # on a level is not above it
+        # a value equal to a level is not above it
         ([3.0, 2.0, 1.0], (10, 3), 2.0, 1),
         ([1.0, 11 * EPS, 9 * EPS], (10, 3), 0.0, 2),
         ([1.0, 11 * EPS, 9 * EPS], (3, 10), 0.0, 2),
@@ -103,7 +103,7 @@ def check(matrix: np.ndarray) -> None:
 
 @given(SHAPES, st.sampled_from([1e-290, 1.0, 1e140]))
 def test_qr_gives_orthonormal_columns_whose_product_is_the_matrix(shape, scale):
-    """Of a tall matrix whose columns have very different sizes, the last one dependent."""
+    """The matrix is tall, its columns have very different sizes, and the last one is dependent."""
     n, m, seed = shape
     matrix = matrix_of((n + m, m, seed))
     matrix[:, -1] = matrix[:, :-1].sum(axis=1)

@@ -1,6 +1,6 @@
-"""The reduced local step against the dense formula, on an invented group and on the real ones.
+"""The reduced local step agrees with the dense formula, for an invented group and real groups.
 
-Reruns are equal to the full-order run where nothing is lost, and ended where they blow up.
+Reduced runs equal the full-order run if the basis is complete, and end where they diverge.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ ROWS = ELEMENTS * P
 
 
 class InventedGroup:
-    """A group whose projections are given per call of `next`, and that records what is asked."""
+    """A group whose projections are set for each call of `next`, and that records requests."""
 
     name = "invented"
     elements = ELEMENTS
@@ -88,9 +88,9 @@ VARIANTS = {
 
 @pytest.mark.parametrize("name", sorted(VARIANTS))
 def test_the_reduced_local_step_adds_the_reconstruction_from_sampled_elements_only(name):
-    """S^T W of `Reduction.reconstruct`, for projections that are not in the space.
+    """S^T W of `Reduction.reconstruct`, for projections outside the space.
 
-    It is added to what is there, and the energy is not known.
+    It is added to the right-hand side, and the energy is unknown.
     """
     reduction = reduction_of(VARIANTS[name])
     other = np.random.default_rng(5).standard_normal((3, ROWS, 3))
@@ -114,7 +114,7 @@ def test_the_reduced_local_step_adds_the_reconstruction_from_sampled_elements_on
     else:
         np.testing.assert_array_equal(group.frames, [reduction.elements])
         assert len(reduction.elements) <= R
-        # what the other elements hold has no influence
+        # projections of other elements have no influence
         hidden = group.projections.reshape(ELEMENTS, P, 3).copy()
         hidden[np.setdiff1d(np.arange(ELEMENTS), reduction.elements)] = np.nan
         group.projections = hidden.reshape(ROWS, 3)
@@ -123,7 +123,7 @@ def test_the_reduced_local_step_adds_the_reconstruction_from_sampled_elements_on
 
 @pytest.mark.parametrize("preset", ["pod", "deim", "block-deim"])
 def test_the_compiled_reduced_step_equals_the_python_code(preset, group_scene):
-    """The lift is timed apart."""
+    """The lift is timed separately."""
     group, q = group_scene.groups[0].for_run(), group_scene.mesh.points
     group.begin_frame(q)
     *positions, y = near(q, 6)
@@ -166,7 +166,7 @@ class Watched:
 
 @pytest.mark.parametrize("group", ["spring", "strain"])
 def test_a_basis_of_all_iterates_repeats_the_full_order_run(group):
-    """Every projection is in the span, so that the orthogonal projection changes nothing."""
+    """Every projection is in the span, so that the orthogonal projection changes no value."""
     scene = scene_with("spring", "strain")
     watched = Watched(scene.group(group))
     reference = trajectory(scene, local_steps=replace_group(scene, group, watched))

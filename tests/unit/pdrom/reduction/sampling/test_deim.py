@@ -1,4 +1,4 @@
-"""DEIM and Q-DEIM of entries, rows and whole elements, against pyMOR and their definitions."""
+"""DEIM and Q-DEIM of entries, rows and elements, against pyMOR and their definitions."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def sampled(v: np.ndarray, elements: np.ndarray, size: int) -> np.ndarray:
 
 @given(SIZES, SEEDS, st.floats(0.0, 1e-13))
 def test_of_mirrored_entries_the_first_is_selected_despite_rounding_errors(size, seed, noise):
-    """Both halves hold the same numbers, up to signs and a noise, as a symmetric motion's do."""
+    """Both halves have equal entries up to signs and noise, as for symmetric trajectories."""
     rng = np.random.default_rng(seed)
     half = bases(size)
     mirrored = half[::-1] * rng.choice([-1.0, 1.0], len(half))[:, None]
@@ -85,7 +85,7 @@ def by_definition(parts: list[np.ndarray], total: int) -> list[int]:
 
 @given(BLOCKS)
 def test_the_greedy_selection_follows_its_definition(size):
-    """Of whole elements, and of rows with a system for each axis, nested in the modes."""
+    """For elements, and for rows with a system for each axis; selections are nested in modes."""
     v, w = blocks(size), blocks((size[0], 3, *size[2:]))
     before = v.copy(), w.copy()
     assert block_elements(v, size[1]).tolist() == by_definition([v], size[0])
@@ -97,20 +97,20 @@ def test_the_greedy_selection_follows_its_definition(size):
 
 
 def test_rows_repeat_only_where_allowed():
-    """Equal second mode: its residual vanishes, so that the largest is the first row again."""
+    """With an equal second mode the residual vanishes, so that the first row is largest again."""
     v = np.repeat(blocks((10, 3, 1, 3)), 3, axis=1)
     assert len(set(joint_rows(v, ALL, False).tolist())) == 3
     flat = np.zeros_like(v)
     assert joint_rows(flat, ALL, True).tolist() == [0, 0, 0]
     assert joint_rows(flat, ALL, False).tolist() == [0, 1, 2]
-    # otherwise the selection ends when every row is taken
+    # otherwise the selection ends when every row is selected
     v = blocks((4, 3, 9, 4))
     assert sorted(joint_rows(v, ALL, False).tolist()) == [0, 1, 2, 3]
     assert len(joint_rows(v, ALL, True)) == 9
 
 
 def qdeim_loop(v: np.ndarray, size: int) -> list[int]:
-    """Q-DEIM as its docstring says, all groups touched at every step."""
+    """Q-DEIM by its definition, with all groups in every step."""
     left, weights = v.copy(), tie_weights(len(v) // size)
     picked: list[int] = []
     for _ in range(min(v.shape[1], len(weights))):
@@ -132,7 +132,7 @@ def test_qdeim_follows_its_definition(size):
 
 
 def spread(kind: str, n: int = 1800, r: int = 24) -> np.ndarray:
-    """Modes (n, r) of many rows of which few matter, all, or mirrored pairs."""
+    """Modes (n, r) of many rows with few large ones, all alike, or in mirrored pairs."""
     rng = np.random.default_rng(5)
     v = rng.standard_normal((n, r))
     if kind == "few":
@@ -147,7 +147,7 @@ def spread(kind: str, n: int = 1800, r: int = 24) -> np.ndarray:
 @pytest.mark.parametrize("size", [1, 3, 9])
 @pytest.mark.parametrize("kind", ["even", "few", "twelve decades", "mirrored"])
 def test_qdeim_among_candidates_selects_the_elements_of_qdeim_among_all(kind, size):
-    """There are far more elements than the candidates that are looked at."""
+    """The mesh has far more elements than candidates."""
     v = spread(kind)
     assert qdeim_elements(v, size).tolist() == qdeim_loop(v, size)
 
@@ -169,7 +169,7 @@ def test_deim_and_qdeim_select_the_entries_of_pymor(kind, size):
     before = v.copy()
     theirs = pymor_deim(NumpyVectorSpace.from_numpy(v), pod=False)[0]
     np.testing.assert_array_equal(deim_entries(v), theirs)
-    if kind == "orthonormal" and len(v) > v.shape[1]:  # a square one has no longest row
+    if kind == "orthonormal" and len(v) > v.shape[1]:  # a square matrix has no longest row
         theirs = pymor_qdeim(NumpyVectorSpace(len(v)).from_numpy(v.copy()), pod=False)[0]
         np.testing.assert_array_equal(qdeim_elements(v, 1), theirs)
     np.testing.assert_array_equal(v, before)

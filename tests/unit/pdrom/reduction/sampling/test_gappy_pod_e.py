@@ -34,7 +34,7 @@ def gain(v: np.ndarray, size: int, elements) -> float:
 
 
 def published_loop(u: np.ndarray, count: int) -> list[int]:
-    """The loop of Peherstorfer, Drmac and Gugercin 2020 (algorithm 1), written out with SVDs."""
+    """The loop of Peherstorfer, Drmac and Gugercin 2020 (algorithm 1) with dense SVDs."""
     picked = qdeim_elements(u, 1).tolist()
     while len(picked) < count:
         _, s, w = np.linalg.svd(u[picked], full_matrices=False)
@@ -54,7 +54,7 @@ def test_selected_rows_follow_the_published_loop(seed):
 
 @given(SIZES)
 def test_the_eigenvalue_growth_is_a_lower_bound_and_exact_for_one_mode(size):
-    """Against dense eigenvalues of G + B^T B; at most |B u|^2, which r = 1 attains."""
+    """Reference: dense eigenvalues of G + B^T B; at most |B u|^2, attained for r = 1."""
     v = modes(size)
     blocks = v.reshape(size[0], size[1], -1)
     rows = blocks[: max(1, size[0] // 2)].reshape(-1, v.shape[1])
@@ -74,7 +74,7 @@ def test_the_eigenvalue_growth_is_a_lower_bound_and_exact_for_one_mode(size):
 @pytest.mark.parametrize("offset", [0.0, *(10.0**k for k in range(-16, 0))])
 @pytest.mark.parametrize("side", [0.0, *(10.0**k for k in range(-20, -4, 3))])
 def test_the_eigenvalue_growth_is_accurate_near_a_double_root(offset, side):
-    """One row (b, sqrt(c)) and a gap near |b|^2: the exact root in 60 digits beside it."""
+    """One row (b, sqrt(c)) and a gap near |b|^2; reference: the exact root in 60 digits."""
     gap, b = 0.37, np.sqrt(0.37) * (1.0 + offset)
     row = np.array([[[b, np.sqrt(side)]]])
     with mpmath.workdps(60):
@@ -108,7 +108,7 @@ def test_each_element_has_the_largest_bound_and_none_raises_the_deim_constant(si
 
 @given(SIZES, st.floats(1.01, 50.0))
 def test_a_bounded_deim_constant_is_reached_with_as_few_elements_as_possible(size, bound):
-    """Orthonormal modes have gain 1 at all elements, so that every bound can be met."""
+    """Orthonormal modes have the constant 1 at all elements, so that every bound can be reached."""
     v = modes(size)
     start = block_elements(v, size[1])
     chosen = oversample(v, size[1], start, bound=bound)

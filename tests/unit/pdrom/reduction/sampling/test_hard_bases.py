@@ -1,4 +1,4 @@
-"""Every method of the study on snapshots that hold little, nothing, or widely different sizes."""
+"""Every method of the study on snapshots that are tiny, constant, or of very different sizes."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def low_rank(rng: np.random.Generator, rank: int) -> np.ndarray:
     return (rng.standard_normal((FRAMES, rank)) @ modes).reshape(FRAMES, -1, 3)
 
 
-# name -> snapshots and the largest rank that they hold (an affine mean takes one of it at most)
+# name -> snapshots and their largest rank (an affine mean reduces it by at most one)
 SNAPSHOTS = {
     "zero": (lambda rng: np.zeros((FRAMES, ELEMENTS * ROWS, 3)), 0),
     "constant": (lambda rng: np.repeat(low_rank(rng, 4)[:1], FRAMES, axis=0), 1),
@@ -44,7 +44,7 @@ REPRODUCED = ("repeated", "rank one", "rank three", "full", "tiny", "huge", "twi
 
 
 def basis_of(p: np.ndarray, method: str, roundoff: float | None = None):
-    """Basis with the round-off of numbers as they are stored, unless more is given."""
+    """Basis with the rounding errors of stored numbers, unless a level is given."""
     roundoff = EPS * float(np.linalg.norm(p)) if roundoff is None else roundoff
     return compute_basis(p, np.ones(p.shape[1]), roundoff, ROWS, METHODS[method])
 
@@ -54,9 +54,9 @@ def basis_of(p: np.ndarray, method: str, roundoff: float | None = None):
 def test_a_basis_spans_its_data_and_reports_its_deim_constant(name, method, rng):
     """The numerical rank never exceeds the rank of the data, and V has no further columns.
 
-    Up to the rank a gain is reported; where it is finite, so is the reconstruction. At the rank the
-    methods `EXACT` give the data `REPRODUCED` back. Sizes beyond it are a named error, and data
-    below their round-off have no basis at all.
+    Up to the rank a DEIM constant is reported; where it is finite, so is the reconstruction. At
+    the rank the methods `EXACT` reproduce the data `REPRODUCED`. Larger sizes are a named error,
+    and data below their rounding errors have no basis.
     """
     make, rank = SNAPSHOTS[name]
     p, spec = make(rng), METHODS[method]
@@ -67,7 +67,7 @@ def test_a_basis_spans_its_data_and_reports_its_deim_constant(name, method, rng)
     assert np.isfinite(basis.mean).all()
     for r in range(1, basis.rank + 1):
         reduction = Reduction(basis, select(basis, spec, r), spec, r)
-        # single axes of bases that are orthonormal as a whole may hold less than one
+        # a single axis of an orthonormal basis may have less than one mode
         assert not np.isnan(reduction.gain)
         assert reduction.gain > 0.0
         if np.isfinite(reduction.gain):

@@ -1,4 +1,4 @@
-"""Selections and reductions of whole methods: the presets and every other combination."""
+"""Selections and reductions of the presets and of every other combination of ingredients."""
 
 import itertools
 
@@ -67,7 +67,7 @@ def made(spec: MethodSpec, seed: int, r: int = 5) -> tuple[np.ndarray, Reduction
 
 
 def span_part(reduction: Reduction, p: np.ndarray) -> np.ndarray:
-    """Best approximation of p in mean + span (of each axis by itself if these are apart)."""
+    """Best approximation of p in mean + span (for each axis if the axes have separate bases)."""
     mean, v = reduction.basis.mean[:, None], reduction.v
     columns = p.reshape(len(p), -1).T - mean
     best = np.zeros_like(columns)
@@ -110,7 +110,7 @@ def test_the_deim_constant_is_the_norm_of_the_pseudo_inverse_and_bounds_the_erro
 
 
 def test_selections_and_numbers_of_rows_and_elements_are_those_of_the_presets():
-    """Each algorithm is reached: no two methods pick the same entries."""
+    """No two methods select the same entries, so that each algorithm is used."""
     by_name = {name: made(spec, 21, 7)[1] for name, spec in PRESETS.items()}
     names = ("deim", "qdeim", "deim-joint", "block-deim", "block-qdeim")
     rows = [by_name[name].rows_sampled for name in ("pod", *names[2:])]
@@ -121,7 +121,7 @@ def test_selections_and_numbers_of_rows_and_elements_are_those_of_the_presets():
 
 
 def test_an_axis_of_rounding_errors_does_not_enter_the_shared_row_selection():
-    """A planar scene: z is round-off, its coefficients are zero and the gain is that of x, y."""
+    """In a planar scene z has only rounding errors and coefficients of zero."""
     p, mass = data(13)
     p[:, :, 2] = 1e-17 * np.random.default_rng(1).standard_normal(p.shape[:2])
     spec = PRESETS["deim-joint"]
@@ -133,14 +133,14 @@ def test_an_axis_of_rounding_errors_does_not_enter_the_shared_row_selection():
 
 
 def test_an_axis_with_a_singular_system_is_a_failure_without_an_exception():
-    """z takes part through a mode beyond r only: at r its system is zero, but not round-off."""
+    """z has a signal only in a mode beyond r: at r its system is zero, without rounding errors."""
     spec = PRESETS["deim-joint"]
     rng = np.random.default_rng(2)
     p = np.zeros((6, ROWS, 3))
     p[:5, :, :2] = 10.0 * rng.standard_normal((5, ROWS, 2))
     p[5, :, 2] = 1e-3 * rng.standard_normal(ROWS)
     basis = compute_basis(p, np.ones(ROWS), 1e-10, P, spec)
-    # exact zeros, as an exactly planar run gives them
+    # exact zeros, as in an exactly planar run
     v = basis.V.copy()
     v.reshape(ROWS, 3, -1)[:, 2, :5] = 0.0
     basis = Basis(**{**vars(basis), "V": v})
@@ -180,7 +180,7 @@ def test_a_reduction_read_from_files_is_the_same(tmp_path):
 @pytest.mark.parametrize("selection", INGREDIENTS["selection"])
 @pytest.mark.parametrize("rows", ["scalar", "element"])
 def test_oversampling_starts_from_the_selection_and_lowers_the_deim_constant(rows, selection):
-    """Single entries and elements, with three samples a mode and with a bound on the gain."""
+    """Single entries and elements, with three samples a mode or a bounded DEIM constant."""
     p, mass = data(11)
     start = MethodSpec(title="t", centring="affine", rows=rows, selection=selection, solve="qr")
     reductions = {
@@ -202,7 +202,7 @@ def test_oversampling_starts_from_the_selection_and_lowers_the_deim_constant(row
 
 
 def test_entries_belong_to_elements_in_order_of_need():
-    """Two rows an element: six entries each; a whole element has all its entries."""
+    """With two rows, an element has six entries; element-wise sampling needs all of them."""
     sampling = Sampling.of_entries(np.array([13, 0, 17, 30, 5]), 2, 6)
     assert sampling.entries.tolist() == [13, 0, 17, 30, 5]
     assert sampling.elements.tolist() == [2, 0, 5]
@@ -230,7 +230,7 @@ def full_rank(rows: int, columns: int, seed: int) -> np.ndarray:
 
 @given(st.integers(1, 12), st.integers(0, 20), SEEDS)
 def test_square_and_qr_solves_equal_the_pseudo_inverse(r, extra, seed):
-    """Square is refused where there are more equations than unknowns."""
+    """The square solve is refused if there are more equations than unknowns."""
     a = full_rank(r + extra, r, seed)
     before = a.copy()
     square, qr = (solution_operator(a, solve, 1e-8) for solve in ("square", "qr"))
@@ -259,7 +259,7 @@ SINGULAR = {
 
 @pytest.mark.parametrize("name", SINGULAR)
 def test_singular_systems_have_an_infinite_deim_constant_unless_regularised(name):
-    """What the published code does: a finite operator of norm at most 1 / (2 sqrt(t))."""
+    """The published code has a finite operator of norm at most 1 / (2 sqrt(t))."""
     a = SINGULAR[name]
     for solve in ("square", "qr"):
         operator = solution_operator(a, solve, 1e-8)

@@ -27,7 +27,7 @@ def modes(size: tuple[int, int, int, int], kind: str = "orthonormal") -> np.ndar
 
 
 def s_opt(v: np.ndarray, size: int, count: int | None = None) -> np.ndarray:
-    """One element a mode, then further ones up to ``count``."""
+    """Select one element a mode, then further ones up to ``count``."""
     return extend(v, size, s_opt_path(v, size), v.shape[1] if count is None else count)
 
 
@@ -46,10 +46,10 @@ def measure(v: np.ndarray, size: int, elements, columns: int | None = None) -> f
 @settings(deadline=None)
 @given(size=SIZES)
 def test_each_element_maximises_the_s_opt_measure(kind, size):
-    """Every step against a determinant for each element that is left."""
+    """Reference: in every step, the determinant for each remaining element."""
     v = modes(size, kind)
     before = v.copy()
-    count = min(size[0], 2 * size[2])  # all, if there are fewer elements than modes
+    count = min(size[0], 2 * size[2])  # all elements, if there are fewer of them than modes
     picked = s_opt(v, size[1], count).tolist()
     np.testing.assert_array_equal(v, before)
     assert len(set(picked)) == len(picked) == count
@@ -77,7 +77,7 @@ def test_selections_of_one_element_a_mode_are_nested_and_can_be_extended(size):
 
 
 def test_rank_updates_stay_accurate_over_many_steps():
-    """After 120 rank-s updates the next element is still the one that determinants give."""
+    """After 120 rank-s updates, determinants select the same next element."""
     v = modes((150, 3, 60, 7), "scaled")
     picked = s_opt(v, 3, 120).tolist()
     left = [e for e in range(150) if e not in picked[:-1]]

@@ -28,11 +28,11 @@ def test_atoms_partition_the_fixed_vertices(boundaries):
     assert len(members) == len(set(members.tolist()))
     assert set(members.tolist()) == set().union(*units)
     for atom in found:
-        # a unit holds all of an atom or nothing of it
+        # a unit contains all of an atom or nothing of it
         assert all(set(atom.tolist()) <= unit or not set(atom.tolist()) & unit for unit in units)
     for one in found:
         for other in found:
-            # and no two atoms could be one
+            # and no two atoms could be merged
             together = [(int(one[0]) in unit) == (int(other[0]) in unit) for unit in units]
             assert one is other or not all(together)
 
@@ -67,7 +67,7 @@ def moved():
 @pytest.mark.parametrize("kind", ["pod", "skinning"])
 @pytest.mark.parametrize("k", [3, 8])
 def test_columns_are_mass_orthonormal_separate_for_atoms_and_span_affine_maps(moved, kind, k, rng):
-    """Coordinates are the best in the mass norm."""
+    """Coordinates give the best approximation in the mass norm."""
     scene, run = moved
     masses, points = scene.masses, scene.mesh.points
     columns = make_columns([scene], run[1:], **{kind: k})
@@ -98,7 +98,7 @@ def test_columns_are_mass_orthonormal_separate_for_atoms_and_span_affine_maps(mo
 
 
 def test_displacement_modes_are_the_mass_weighted_pod_up_to_the_rank_of_the_data(moved):
-    """Against a dense SVD of the snapshots that have lost their affine part."""
+    """Reference: a dense SVD of the snapshots without their affine part."""
     scene, run = moved
     points, masses = scene.mesh.points, scene.masses
     modes = spaces.displacement_modes(run[1:], points, masses, 5)
@@ -118,7 +118,7 @@ def test_displacement_modes_are_the_mass_weighted_pod_up_to_the_rank_of_the_data
 
 @pytest.mark.parametrize("handles", [1, 2, 5, 12, 30])
 def test_skinning_weights_are_a_partition_of_unity(handles):
-    """Whatever the place and size of the points."""
+    """For any position and size of the points."""
     points = make_scene(SPRING).mesh.points
     weights = spaces.skinning_weights(points, handles)
     assert weights.shape == (30, handles)
@@ -131,7 +131,7 @@ def test_skinning_weights_are_a_partition_of_unity(handles):
 
 @pytest.mark.parametrize("k", [1, 4, 9, 500])
 def test_skinning_modes_are_mass_orthonormal_without_affine_part(moved, k):
-    """They end at the size of the mesh: all but the three affine columns of a flat sheet."""
+    """Their number ends at the size of the mesh minus the three affine columns of a flat sheet."""
     scene, _ = moved
     points, masses = scene.mesh.points, scene.masses
     modes, count = spaces.skinning_modes(points, masses, k), min(k, len(points) - 3)
@@ -141,7 +141,7 @@ def test_skinning_modes_are_mass_orthonormal_without_affine_part(moved, k):
 
 
 def test_a_system_that_cannot_be_solved_is_an_error():
-    """Indefinite; a stiffness of 1 between six coordinates, and 1e-12 of it for all together."""
+    """Indefinite, or with stiffness 1 between six coordinates and 1e-12 for all together."""
     for matrix in (np.diag([1.0, -1.0]), (1.0 + 1e-12) * np.eye(6) - np.full((6, 6), 1.0 / 6.0)):
         with pytest.raises(SolverError):
             DenseElimination(matrix, np.empty(0, dtype=np.int64))
@@ -149,7 +149,7 @@ def test_a_system_that_cannot_be_solved_is_an_error():
 
 @pytest.mark.parametrize("mass", [1e-100, 1e-6, 1.0, 1e100])
 def test_coordinates_do_not_depend_on_the_unit_of_mass(mass, rng):
-    """With held vertices, whose columns are not mass-orthonormal; the rest shape is met exactly."""
+    """With fixed vertices, whose columns are not mass-orthonormal; the rest shape is exact."""
     scene = make_scene(TOP, SPRING, vertex_mass=mass)
     points = scene.mesh.points
     motion = points + 0.1 * rng.standard_normal((5, *points.shape))

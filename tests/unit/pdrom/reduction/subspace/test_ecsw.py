@@ -1,4 +1,4 @@
-"""Energy-conserving sampling and weighting: few elements that stand for all, and stability.
+"""Energy-conserving sampling and weighting (ECSW): few weighted elements, and stability.
 
 Its non-negative least squares with early stop are compared with SciPy's and with all supports.
 """
@@ -109,7 +109,7 @@ def exact_forces(group, columns, training) -> np.ndarray:
 def test_candidates_are_part_of_the_group_and_grow_if_they_miss_the_tolerance(
     pulled, monkeypatch, number, tolerance
 ):
-    """Half of the candidates of one group, three of the other, which are too few."""
+    """Half of one group are candidates, and three elements of the other, which are too few."""
     scene, _, columns = pulled
     group = scene.groups[number]
     training = ecsw.training_run(scene, columns, [2, 8])
@@ -125,7 +125,7 @@ def test_candidates_are_part_of_the_group_and_grow_if_they_miss_the_tolerance(
 
 
 def test_all_elements_with_factors_of_one_satisfy_the_training_equations(pulled):
-    """What is trained on is an identity: all equations hold for the iterates of the run."""
+    """The training equations hold for all iterates of the run."""
     scene, _, columns = pulled
     steps = [SubspaceLocalStep(group, columns) for group in scene.groups]
     space = ReducedSpace(scene, columns, [step.matrix for step in steps])
@@ -151,13 +151,13 @@ def test_all_elements_with_factors_of_one_satisfy_the_training_equations(pulled)
 
 
 def test_training_equations_follow_their_definition_element_by_element(rng):
-    """Element by element from the definition; hashing adds each equation to one row, signed."""
+    """Hashing adds each equation, with a sign, to one row."""
     scene = SCENES["strain"]
     group, columns = copy(scene.groups[0]), random_columns(scene, rng, 3)
     group.weights = group.weights * rng.uniform(0.2, 5.0, group.elements)
     k = columns.B.shape[1]
     before, _ = pair = rng.standard_normal((2, k, 3))
-    # the constant column has no strain, hence one equation an axis less
+    # the constant column has no strain, hence one equation less for each axis
     measure = rng.standard_normal((k - 1, k))
     count = 3 * (k - 1)
     frame = ecsw.TrainingFrame(before, pair[None], measure)
@@ -179,7 +179,7 @@ def test_training_equations_follow_their_definition_element_by_element(rng):
 
 
 def test_a_group_without_force_in_training_keeps_all_elements(pulled):
-    """No force at all in the training states: there is nothing to fit, so all elements stay."""
+    """The training states have no force: nothing can be fitted, so all elements stay."""
     scene, _, columns = pulled
     rest = coordinates(columns, scene.masses, scene.mesh.points)
     measure = np.eye(len(rest))
@@ -229,7 +229,7 @@ def test_least_squares_without_tolerance_follow_lawson_and_hanson(m, e, seed, sc
 
 
 def test_least_squares_by_blocks_of_columns_reach_the_same_minimum(rng):
-    """Large enough that several columns join at a time and that columns leave."""
+    """The problem is so large that several columns join at a time and that columns leave."""
     g = rng.standard_normal((150, 400)) + 0.2 * rng.standard_normal((150, 1))
     b = g[:, :80].sum(axis=1) + 10.0 * rng.standard_normal(150)
     support, values = stopped(g, b, 0.0)
@@ -240,7 +240,7 @@ def test_least_squares_by_blocks_of_columns_reach_the_same_minimum(rng):
 
 
 def test_each_tolerance_of_a_path_is_satisfied_with_few_columns():
-    """Sum of many smooth columns: far fewer of them suffice."""
+    """The right-hand side is a sum of many smooth columns: far fewer of them suffice."""
     g, b = SMOOTH, SMOOTH.sum(axis=1)
     tolerances = [1e-3, 0.5, 0.1, 1e-2, 1e-5]
     path = nnls_path(g, b, tolerances)

@@ -27,9 +27,9 @@ from pdrom.reduction.subspace.training import make_columns
 
 
 def test_the_space_is_orthonormal_starts_with_rest_vectors_and_fits_least_squares(group_scene, rng):
-    """In the weights of the elements; a space for which samples are too few is a named error.
+    """Products use the weights of the elements; a space with too few samples is a named error.
 
-    Centres of elements, by which they are chosen, are the means of their vertices.
+    Elements are chosen by their centres, which are the means of their vertices.
     """
     group, points = group_scene.groups[0], group_scene.mesh.points
     centres = hrpd.element_centres(group, points)
@@ -56,7 +56,7 @@ def test_the_space_is_orthonormal_starts_with_rest_vectors_and_fits_least_square
 @settings(max_examples=10)
 @given(seed=st.integers(0, 2**31), handles=st.integers(2, 4))
 def test_blended_linear_maps_are_reproduced_exactly(name, seed, handles):
-    """p_e = sum_h w_h(e) (S_e q_rest) T_h is in the space, and few samples find it."""
+    """p_e = sum_h w_h(e) (S_e q_rest) T_h is in the space, and few samples reproduce it."""
     scene = make_scene({"effect": name, "weight": 1e4}, mesh=GROUPS[name])
     group, points, rng = scene.groups[0], scene.mesh.points, np.random.default_rng(seed)
     rest = group.S @ points
@@ -74,7 +74,7 @@ def test_blended_linear_maps_are_reproduced_exactly(name, seed, handles):
 
 
 def test_hrpd_is_exact_with_all_elements_and_for_a_rotated_rest_shape(group_scene, rng):
-    """One linear map for all elements is in the space, whatever its dimension and samples."""
+    """One linear map for all elements is in the space, for any dimension and samples."""
     scene, group, rest = group_scene, group_scene.groups[0], group_scene.mesh.points
     size = group.elements * group.rows_per_element
     turned = rest @ random_rotation(rng).T + rng.standard_normal(3)
@@ -99,7 +99,7 @@ def test_hrpd_is_exact_with_all_elements_and_for_a_rotated_rest_shape(group_scen
 
 
 def test_projections_of_rounding_errors_need_no_element():
-    """A flat sheet has nothing to bend: no mode, no sample, and the same run as with all."""
+    """A flat sheet does not bend: no mode, no sample, and the same run as with all elements."""
     scene = make_scene({"effect": "bending", "weight": 10.0}, SPRING, GRAVITY, TOP, frames=5)
     reference = trajectory(scene)
     columns = make_columns([scene], reference[1:], 3)

@@ -1,4 +1,4 @@
-"""Runs in a position subspace: exact where nothing is lost, and independent of the mesh."""
+"""Runs in a position subspace: exact if the basis is complete, independent of the mesh."""
 
 from functools import partial
 
@@ -33,7 +33,7 @@ BAR = GROUPS["tetrahedron_strain"]
 POKE = {"effect": "poke", "over": 4, "rest": 2, "count": 2, "avoid": ["top"]}
 DOWN = {"effect": "gravity", "acceleration": [0.0, -300.0, 0.0]}
 
-# each test makes its own: what a module holds is not released before the interpreter ends
+# each test makes one: fixtures of a module stay in memory until the interpreter ends
 SCENES = {
     "free": partial(make_scene, SPRING, STRAIN, GRAVITY, frames=6),
     "pins": partial(make_scene, SPRING, GRAVITY, TOP, frames=6),
@@ -49,7 +49,7 @@ SCENES = {
 
 
 def ecsw_of(scene, columns, every=5):
-    """Every fifth element, for five."""
+    """Every fifth element, with a weight of five."""
     taken = {g.name: np.arange(0, g.elements, every) for g in scene.groups}
     return {
         name: models.Samples(few, np.full(len(few), every * 1.0)) for name, few in taken.items()
@@ -64,7 +64,7 @@ def hrpd_of(scene, columns):
 
 
 def whole_space(scene):
-    """Columns that span all motions of all vertices."""
+    """Columns that span all positions of all vertices."""
     n = scene.mesh.vertices
     found = atoms(training.held_units([scene]), n)
     anything = np.random.default_rng(0).standard_normal((n, n, 3))
@@ -102,7 +102,7 @@ def test_fixed_vertices_have_their_prescribed_positions_exactly(name, kind, made
                 continue
             held = boundary.held(frame)
             if not np.array_equal(held, last):
-                # a poked vertex starts from wherever this run has brought it
+                # a poked vertex starts at its current position in this run
                 took_hold, last = frame, held
             moved, wanted = (r[frame + 1, held] - r[took_hold, held] for r in (result, reference))
             np.testing.assert_allclose(moved, wanted, atol=1e-12)
@@ -112,14 +112,14 @@ def test_fixed_vertices_have_their_prescribed_positions_exactly(name, kind, made
 
 @pytest.mark.parametrize(("vertices", "columns"), [(3, 1), (512, 4), (1300, 7)])
 def test_positions_in_single_precision_are_columns_times_coordinates(vertices, columns):
-    """Sizes below, at and above those of the panels."""
+    """The sizes are below, at and above those of the panels."""
     rng = np.random.default_rng(1)
     B, z = rng.standard_normal((vertices, columns)), rng.standard_normal((columns, 3))
     np.testing.assert_allclose(models.Output(B)(z), B @ z, rtol=0.0, atol=1e-5)
 
 
 def test_a_restricted_group_equals_the_full_group_on_its_elements(group_scene, rng):
-    """Projections, energy and right-hand side, also from frozen data of a frame; it stays apart."""
+    """Projections, energy and right-hand side are equal, also with the frozen data of a frame."""
     group, points = group_scene.groups[0].for_run(), group_scene.mesh.points
     elements = np.sort(rng.permutation(group.elements)[: group.elements // 3])
     factors = rng.uniform(0.5, 4.0, len(elements))
@@ -145,7 +145,7 @@ def test_a_restricted_group_equals_the_full_group_on_its_elements(group_scene, r
 @pytest.mark.parametrize("made", [ecsw_of, hrpd_of])
 @pytest.mark.parametrize("name", ["handles", "bending", "bar", "poke", "damped"])
 def test_a_reduced_step_reads_no_array_of_the_length_of_the_mesh(name, made):
-    """With everything of the length of the mesh overwritten a second run is the same."""
+    """After all arrays of the length of the mesh are overwritten, a second run is the same."""
     scene = SCENES[name]()
     columns = training.make_columns([scene], trajectory(scene)[1:], 3)
     loop, start = models.SubspaceModel(columns, made(scene, columns)).loop(scene)
@@ -172,7 +172,7 @@ def test_a_reduced_step_reads_no_array_of_the_length_of_the_mesh(name, made):
     "name", ["free", "handles", "released", "poke", "damped", "dragged", "bending", "bar"]
 )
 def test_iterations_in_compiled_code_equal_those_of_the_step_loop(name):
-    """The compiled loop against the step loop with projections and solve one after the other."""
+    """The step loop does projections and solve one after the other."""
     scene = SCENES[name]()
     reference = trajectory(scene)
     columns = training.make_columns([scene], reference[1:], 4)
@@ -209,7 +209,7 @@ def test_newton_steps_reach_the_minimum_that_scipy_and_local_global_iterations_f
     start, seen = s[system.free].ravel(), []
     wanted = optimize.minimize(evaluate, start, jac=True, options={"gtol": 1e-7}).x
     found = loop.step(state, 0, seen.append)[0].positions
-    near = 2e-5 * scene.mesh.extent  # frames end at 1e-6, for the mean of all vertices
+    near = 2e-5 * scene.mesh.extent  # frames end at 1e-6 in the mean over all vertices
     np.testing.assert_allclose(found[system.free].ravel(), wanted, atol=near)
     limit = model.loop(scene.iterated(3000))[0].step(state, 0)[0].positions
     np.testing.assert_allclose(found, limit, atol=near)
@@ -244,7 +244,7 @@ def test_forces_that_cannot_be_reduced_are_refused():
 
 
 def test_models_are_read_as_they_were_written(tmp_path):
-    """The layout of rule subspaces."""
+    """The file has the layout of the rule `subspaces`."""
     scene = SCENES["handles"]()
     reference = trajectory(scene)
     columns = training.make_columns([scene], reference[1:], 4)

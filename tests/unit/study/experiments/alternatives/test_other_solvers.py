@@ -1,4 +1,4 @@
-"""Other methods end at the implicit step of projective dynamics; two levels save iterations."""
+"""Alternatives converge to the implicit step of projective dynamics; two levels save iterations."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from study.experiments.alternatives.solvers import Chebyshev, TwoLevel, measured
 SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 HELD = (GRAVITY, LEFT)
 CLOSED_FORM = ("spring", "strain", "tetrahedron_strain", "deformation_gradient")
-CHEBYSHEV = 1500  # iterations that suffice on these meshes
+CHEBYSHEV = 1500  # a sufficient number of iterations on these meshes
 
 
 def small(group: str, *effects: dict, weight: float = 1e5, **settings):

@@ -1,4 +1,4 @@
-"""Costs of the effects of a frame: each effect has its own, no other."""
+"""Costs of the effects of a frame: each effect has its cost only."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_every_effect_has_a_row_and_the_shares_add_up_to_one():
 
 
 def test_a_timed_effect_and_its_kernel_return_the_values_of_the_effect(rng):
-    """Timed effects stay in the compiled loop, so that their times are those of a run."""
+    """Timed effects stay in the compiled loop, so that their times equal those in a run."""
     scene = make_scene(*EFFECTS)
     group = scene.group("strain")
     y = scene.mesh.points + 0.01 * rng.standard_normal(scene.mesh.points.shape)

@@ -1,4 +1,4 @@
-"""Verdicts: every branch, every metric by hand, thresholds that decide, and other rules."""
+"""Verdicts: every branch, every metric by hand, deciding thresholds, and other rules."""
 
 import numpy as np
 import pandas as pd
@@ -114,22 +114,22 @@ def measured(metric: str, accuracy: float = 0.1, **where) -> list[float]:
         ("error_trend", {"scene": "d", "method": "qdeim"}, [0.0]),
         # blocks of different lengths, and one block alone, have no joint trend
         ("trend_p_value", {"scene": "d", "method": "deim"}, []),
-        # two blocks of three sizes, both ascending: one of 3!^2 orders
+        # two blocks of three sizes, both ascending: one of 3!^2 possible orders
         ("repeated_trend_p_value", {"varied": "training"}, [1.0 / 36.0]),
         ("repeated_trend_p_value", {"varied": "training", "scene": "a"}, []),
         # full rank blew up at once: the smaller size must not stand in for it
         ("rerun_error", {"scene": "c", "method": "deim-joint", "r": "full"}, [np.inf]),
         ("rerun_error", {"scene": "c", "method": "qdeim"}, []),
-        # a group whose singular values are all round-off has no decay
+        # a group whose singular values are all rounding errors has no decay
         ("singular_value_decay", {"component": 2}, [1e-2]),
         ("reconstruction_error", {}, [0.3, np.inf]),
-        # x and y of two sizes, the second one singular; z is round-off at every size
+        # x and y of two sizes, the second one singular; z is a rounding error at every size
         ("axis_reconstruction_error", {}, [0.2, np.inf, 0.4, np.inf]),
         ("axis_reconstruction_error", {"axis": "y", "scene": "a"}, [0.4, np.inf]),
         # a size beyond the rank does not run, a run that ends early has failed
         ("noise_error", {}, [1e-9, np.inf]),
         ("elements_per_entry", {}, [1.0, 0.9]),
-        # a run that is wrong buys nothing; the largest over the sizes of a scene
+        # a run with a large error has no speed-up; the largest over the sizes of a scene
         ("useful_speedup", {"scene": "a", "method": "deim"}, [0.5, 0.0]),
         ("useful_speedup", {"scene": "a", "accuracy": 0.5}, [0.5, 1.0]),
         ("best_useful_speedup", {"scene": ("a", "b"), "accuracy": 0.5}, [1.0, 2.0]),
@@ -151,10 +151,10 @@ def test_the_trend_of_all_experiments_together(monkeypatch):
     """Three blocks of three sizes, all ascending: one of 3!^3 orders, SciPy's smallest p-value."""
     columns = [(s, r, 10, None, float(r)) for s in "efg" for r in (6, 10, 20)]
     rising = [(s, "spring", "deim", "full", None, r, f, b, e, 1.0) for s, r, f, b, e in columns]
-    # a twin and another method add no block
+    # a short variant of a scene and another method add no block
     more = [(f"{s}_twin", *rest) for s, *rest in rising]
     more += [(*row[:2], "qdeim", *row[3:]) for row in rising]
-    # a run that ended early is the worst of its block
+    # a diverged run is the worst of its block
     failed = [(*row[:8], np.nan if row[5] == 20 else row[8], 1.0) for row in rising]
     falling = [(*row[:8], 1.0 / row[8], 1.0) for row in rising]
     least = 1.0 / 216.0
@@ -206,7 +206,7 @@ def test_a_share_of_rows_must_agree_and_ratios_near_the_limit_are_inconclusive(
 
 @given(st.lists(st.floats(0.01, 100.0), min_size=1, max_size=20), st.data())
 def test_a_claim_about_times_is_not_reversed_on_a_machine_twice_as_fast(ratios, data):
-    """Ratios that move by less than the margin squared do not cross both of its ends."""
+    """Ratios that change by less than the margin squared do not cross both of its ends."""
     test = rule("solve_time_ratio", ">=", 1.0)
     moves = data.draw(arrays(float, len(ratios), elements=st.floats(0.45, 2.2)))
     answers = {verdicts.answer_of(test, np.array(ratios) * moved) for moved in (1.0, moves)}
@@ -214,7 +214,7 @@ def test_a_claim_about_times_is_not_reversed_on_a_machine_twice_as_fast(ratios, 
 
 
 def test_the_speedup_of_an_inaccurate_run_counts_as_zero():
-    """Their speed-up counts as 0, clearly below any limit."""
+    """Zero is clearly below every limit."""
     test = rule("useful_speedup", "<=", 1.0)
     for third, expected in ((0.0, HOLDS), (1.1, MACHINE)):
         assert verdicts.answer_of(test, np.array([0.0, 0.0, third, 0.9])) == expected
@@ -244,7 +244,7 @@ def verdict(tmp_path, *tests: dict) -> pd.Series:
 
 
 def whole() -> dict[str, pd.DataFrame]:
-    """A table for each that some metric reads."""
+    """One table for each table that a metric reads."""
     return {m.table: tables().get(m.table, pd.DataFrame()) for m in METRICS.values()}
 
 
@@ -277,7 +277,7 @@ def test_a_claim_gets_the_expected_verdict(tmp_path, tests, expected):
 
 
 def test_verdicts_by_two_errors_use_the_larger_error(tmp_path):
-    """Thrice the position error, .1, or none where the reference moves rigidly."""
+    """The deformation error is thrice the position error of .1, or missing for rigid references."""
     test = {"metric": "useful_speedup", "where": {"scene": ["a"], "r": [6]}, "accuracy": 0.1}
     for accuracy, both in ((0.4, HOLDS), (0.1, FAILS)):
         row = verdict(tmp_path, test | {"accuracy": accuracy})
@@ -334,7 +334,7 @@ RULES = load_claims(PATH)
 
 @pytest.mark.parametrize("name", RULES)
 def test_the_last_change_of_a_claim_is_that_of_its_rules(name):
-    """A rule that is edited needs an entry: its date, its reason, whether results were known."""
+    """An edited rule needs an entry with its date, its reason, and whether results were known."""
     rule = RULES[name]
     assert rule.changes[-1].rules == rule.fingerprint, (
         f"config/claims.yaml: {name}: the rules have the fingerprint {rule.fingerprint}: say when "
@@ -356,7 +356,7 @@ def test_a_fingerprint_changes_with_every_rule_but_not_with_its_words():
 
 
 def test_claims_without_data_are_undecided():
-    """Every rule names columns that exist, and none passes for lack of rows."""
+    """Every rule names existing columns, and no rule is satisfied without rows."""
     empty = {name: table.checked(pd.DataFrame()) for name, table in declared().items()}
     rows = claims(PATH, {}, **empty)
     assert rows.claim.tolist() == list(RULES)
@@ -401,7 +401,7 @@ def test_only_claims_about_times_are_timed():
     assert timed["C1"] == timed["C9"] == one | {"why_beyond", "answer", "verdict_both"}
     assert timed["C11"] == {f"{name}_beyond" for name in one} | {"answer", "verdict_beyond_both"}
     assert timed["C2"] == timed["C7"] == timed["C12"] == set()
-    # a timed test beside the verdict makes only its reason timed
+    # a timed test that does not decide makes only the reason timed
     beside = [{"metric": "rerun_error"}, {"decides": False}]
     beside = [{"margin": None} | test for test in beside]
     made = validate(ClaimRule, claim(*beside) | {"beyond": []}, "test")
@@ -474,7 +474,7 @@ def test_every_test_of_a_claim_reports_its_values_and_the_deciding_ones_the_verd
     nothing = outcomes[outcomes.of == 0]
     assert (nothing.verdict == UNDECIDED).all()
     assert nothing[["least", "median", "most"]].isna().all(axis=None)
-    # words tell the tests of a part apart
+    # the tests of a part have different words
     assert not outcomes.duplicated(["claim", "part", "what"]).any()
     for row in claims(PATH, {}, **tables).itertuples():
         for part, verdict in (("published", row.verdict), ("beyond", row.verdict_beyond)):

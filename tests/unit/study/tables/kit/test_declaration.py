@@ -1,4 +1,4 @@
-"""Declarations: what they refuse, what they make of a frame, and that the study's are sound."""
+"""Declarations of tables: errors, conversion of a frame, and those of the study."""
 
 import numpy as np
 import pandas as pd
@@ -55,7 +55,7 @@ def test_the_file_of_a_table_without_rows_has_its_columns(content, tmp_path):
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0), (0, 1, 2)])
 def test_a_column_of_flags_keeps_its_type_if_a_part_has_none(order):
-    """A file in which nothing ran has a column of empty numbers."""
+    """A file without runs has a column of empty numbers."""
     cells = pd.Series([True]), pd.Series([np.nan]), pd.Series([1.0])
     rows = pd.DataFrame([ROW] * len(order)).drop(columns="good")
     good = invented.checked(rows.assign(good=pd.concat([cells[i] for i in order]).array)).good
