@@ -18,7 +18,7 @@ def pytest_benchmark_update_json(
 
 
 def pytest_benchmark_update_machine_info(config: Any, machine_info: dict[str, Any]) -> None:
-    """Replace the record of the machine by the study's own."""
+    """Replace the record of the machine by that of the study."""
     machine_info.clear()
     machine_info.update(machine().model_dump(mode="json"))
 

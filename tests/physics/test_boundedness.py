@@ -135,7 +135,7 @@ def random_forces(scene: Scene, rng: np.random.Generator) -> tuple[np.ndarray, f
     return forces, float(max(norms))
 
 
-def test_the_bound_of_the_theorem_holds_in_random_scenes_and_is_nearly_reached():
+def test_the_bound_of_the_theorem_holds_for_random_scenes_and_is_nearly_reached():
     """Masses, forces, fixed vertices and projections are random; a resonant mode comes close."""
     used: list[float] = []
     for seed in range(2 * SCENES):

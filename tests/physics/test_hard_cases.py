@@ -1,11 +1,11 @@
-"""Every hard case: the checks of its full-order run, and every reduction.
+"""Full-order runs and reductions of every hard case.
 
-A reduction does not fail, or hard_cases.expected has its reason.
+A reduction does not fail, or `hard_cases.expected` has the reason.
 
 In exact arithmetic, the objective of a frame falls in every iteration. Computed values may rise for
 two reasons, with the unit round-off u and a constant c. Errors up to c u (|y| + |s|) of y - s, and
-up to c u (|S| |y| + |p|) of S y - p, change a value E by up to 2 sqrt(E R) + R, R the objective of
-these errors alone. A Cholesky solve leaves a residual |r| <= c u |A| |y| (Higham 2002, theorem
+up to c u (|S| |y| + |p|) of S y - p, change a value E by up to 2 sqrt(E R) + R, where R is the
+objective of these errors. A Cholesky solve has a residual |r| <= c u |A| |y| (Higham 2002, theorem
 10.4), so that it misses the minimum by up to |r|^2 / (2 lambda_min(A)).
 """
 

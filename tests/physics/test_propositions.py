@@ -25,9 +25,9 @@ SHEET = {"kind": "cloth", "rows": 6, "columns": 5, "plane": "xz"}
 
 
 def test_the_energy_may_rise_although_the_objective_falls():
-    """A sheet of springs thrown through its own centre: all springs turn over within one frame.
+    """A sheet of springs moves through its centre: all springs turn over within one frame.
 
-    One spring with a = h^2 w / m gains the factor (1 + a/(1+a))^2 + a/(1+a)^2, between 1 and 4.
+    One spring with a = h^2 w / m has the factor (1 + a/(1+a))^2 + a/(1+a)^2, between 1 and 4.
     """
     scene = make_scene({"effect": "spring", "weight": 1e7}, iterations=30, frames=1)
     points = scene.mesh.points - scene.mesh.points.mean(axis=0)

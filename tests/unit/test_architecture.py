@@ -19,7 +19,7 @@ ROOMS = (
 PACKAGES = ("pdrom", "study")
 NUMERICS = ("pdrom.core", "pdrom.model", "pdrom.reduction", "study.experiments", "study.tables")
 MODULE_LINES, CLASS_LINES = 500, 200
-# Words with which a docstring says why a module is longer.
+# Words with which a docstring gives the reason for a longer module.
 REASON = "one module because"
 
 

@@ -21,9 +21,11 @@ TERMS = re.compile(
     r"\brigid[ -]motions?\b|\bequations? of motion\b|\bMotion in Games\b", re.IGNORECASE
 )
 WORDS = re.compile(rf"\b(?:{'|'.join(REFUSED)})\b", re.IGNORECASE)
-# What no reader sees as prose: code in Markdown, addresses; names, keys and comments in TeX.
+# Text that no reader sees as prose: code in Markdown, addresses; names, keys and comments in TeX.
 CODE = re.compile(r"```.*?```|`[^`]*`|(?<=\])\([^)]*\)", re.DOTALL)
-KEYS = re.compile(r"(?<!\\)%.*|\\(?:texttt|n|ref|eqref|label|cite|figureof|input|tablefile)\{[^{}]*\}")
+KEYS = re.compile(
+    r"(?<!\\)%.*|\\(?:texttt|n|ref|eqref|label|cite|figureof|input|tablefile)\{[^{}]*\}"
+)
 
 
 def refused(text: str) -> list[str]:

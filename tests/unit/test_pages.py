@@ -106,7 +106,7 @@ def test_the_scene_the_study_and_the_method_that_are_added_are_valid() -> None:
     assert [MethodSpec.model_validate(method).rows for method in methods.values()] == ["scalar"]
 
 
-def test_effects_and_selections_are_listed_and_those_that_no_position_subspace_takes() -> None:
+def test_effects_and_selections_are_listed_and_those_that_no_subspace_accepts() -> None:
     page, text = (CONFIG / "README.md").read_text("utf-8"), ADDING.read_text("utf-8")
     (sentence,) = re.findall(r"^Effects: (.*?)\.\n", text, re.MULTILINE | re.DOTALL)
     assert sorted(re.findall(r"`(\w+)`", sentence)) == sorted(EFFECTS)

@@ -25,13 +25,13 @@ def offends(path: Path) -> bool:
     )
 
 
-def test_no_large_or_binary_file_is_tracked_or_about_to_be():
+def test_no_large_or_binary_file_is_tracked_or_untracked():
     files = tracked("--cached", "--others", "--exclude-standard")
     assert len(files) > 500
     assert [str(path.relative_to(ROOT)) for path in files if offends(path)] == []
 
 
-def test_the_manifest_for_codecheckers_follows_version_2_and_names_what_the_study_makes():
+def test_the_manifest_for_codecheckers_follows_version_2_and_lists_the_outputs():
     """https://raw.githubusercontent.com/codecheckers/register/master/rules-2.0.yml"""
     path = ROOT / "codecheck.yml"
     assert path.read_text("utf-8").startswith("---\n")

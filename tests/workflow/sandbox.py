@@ -40,7 +40,7 @@ SHIM = '#!/bin/sh\nPYTHONPATH="{hooks}" exec "{python}" {module} "$@"\n'
 
 @dataclass(frozen=True)
 class Sandbox:
-    """A copy of the repository with the tests' own environment as its ``.venv``."""
+    """A copy of the repository with the environment of the tests as its ``.venv``."""
 
     folder: Path
 

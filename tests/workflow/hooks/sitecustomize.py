@@ -1,9 +1,9 @@
-"""Faults on demand, for the jobs of a sandbox: see `sandbox.Sandbox.run`.
+"""Cause faults in the jobs of a sandbox, see `sandbox.Sandbox.run`.
 
-Python imports this module at its start. ``PDROM_FAULT`` is ``kind:pattern``: when a result is
-complete whose temporary file (not its checksum) matches the pattern, but has not got its name yet,
-the process is killed ("kill"), told that the disk is full ("full"), kept waiting by a slow disk
-("slow") or held until there is a file `release` in its folder ("hold").
+Python imports this module at its start. ``PDROM_FAULT`` is ``kind:pattern``. A fault occurs when a
+result is complete and about to be renamed, if its temporary file (not its checksum) matches the
+pattern: the process is killed ("kill"), gets a full disk ("full"), waits for a slow disk ("slow")
+or waits until its folder contains a file `release` ("hold").
 """
 
 import errno

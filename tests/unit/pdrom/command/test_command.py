@@ -131,7 +131,7 @@ def test_a_file_of_the_user_is_never_moved_changed_or_removed(folder, name, caps
     assert content(folder) == before
 
 
-def test_a_damaged_run_is_refused_and_left_where_it_is(folder, finished, capsys):
+def test_a_damaged_run_is_refused_and_not_moved(folder, finished, capsys):
     Path("small.h5").write_bytes((finished / "small.h5").read_bytes() + b"more")
     before = content(folder)
     for arguments in reads_of("small.h5")[:3]:
@@ -447,7 +447,7 @@ def test_threads_and_kernels_are_set_before_numpy_is_loaded():
 REPORT = FrameReport(np.zeros(0), np.array([0.0, 1e-3, 1e-3, 0.0]))
 
 
-def test_progress_on_a_terminal_is_one_line_that_is_written_again(monkeypatch):
+def test_progress_on_a_terminal_is_one_line_that_is_overwritten(monkeypatch):
     """The line changes five times a second; its estimate ignores a frame that compiles kernels."""
     stream = io.StringIO()
     stream.isatty = lambda: True

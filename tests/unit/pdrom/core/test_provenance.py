@@ -25,7 +25,7 @@ def test_the_hash_depends_on_every_value_and_not_on_the_order_of_keys(other):
     assert configuration_hash(other) != reference
 
 
-def test_attributes_of_a_job_are_repeatable_and_hold_the_configuration():
+def test_attributes_of_a_job_are_repeatable_and_contain_the_configuration():
     configuration = {"scene": "bend_fall", "path": Path("a/b")}
     with made_by("fom", configuration, "c0de"):
         first, second = provenance.attributes(), provenance.attributes()
@@ -38,7 +38,7 @@ def test_attributes_of_a_job_are_repeatable_and_hold_the_configuration():
     assert all(isinstance(value, str) for value in first.values())
 
 
-def test_a_record_holds_the_declared_keys_and_ends_with_its_job():
+def test_a_record_contains_the_declared_keys_and_ends_with_its_job():
     with pytest.raises(ValueError, match="inside"), made_by("ladder", {}, "c0de"):
         assert list(provenance.provenance()) == list(provenance.RECORD)
         raise ValueError("inside")

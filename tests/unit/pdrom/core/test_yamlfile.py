@@ -132,7 +132,7 @@ INNER = r"\(allowed: size, kind\)"
         *((data, "a mapping of keys is required") for data in (None, [], "text", 3)),
     ],
 )
-def test_faults_name_source_key_and_what_is_allowed(data, message):
+def test_faults_name_source_key_and_allowed_values(data, message):
     with pytest.raises(ConfigurationError, match=f"^source: {message}"):
         validate(Outer, data, "source")
 

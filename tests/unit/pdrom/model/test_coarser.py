@@ -46,7 +46,7 @@ def test_affine_states_are_exact_on_the_coarse_mesh_and_back(rng):
     assert made.matrix @ found.velocities == pytest.approx(at)
 
 
-def test_a_held_side_moves_as_on_the_fine_mesh():
+def test_a_fixed_side_moves_as_on_the_fine_mesh():
     hold = {"effect": "translate", "select": "x_min", "offset": [0.1, 0.2, 0.0], "over": 5}
     scene = solid(hold, frames=6)
     (made,) = coarser.grids(scene, (0.5,))

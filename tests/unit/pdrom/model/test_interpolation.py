@@ -29,7 +29,7 @@ def distance(corners: np.ndarray, point: np.ndarray) -> float:
     return float(np.linalg.norm(nnls(whole, np.append(point, 1e5))[0] @ corners - point))
 
 
-def test_a_point_inside_has_affine_values_and_one_outside_those_of_the_nearest_point(
+def test_a_point_inside_has_affine_values_a_point_outside_those_of_the_nearest_point(
     mesh, rng, monkeypatch
 ):
     for name, few in (("PAIRS", 500), ("FIRST", 1)):  # the search continues in parts

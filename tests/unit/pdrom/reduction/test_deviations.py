@@ -73,7 +73,7 @@ def test_position_and_deformation_errors_cover_the_same_frames_and_weigh_masses(
     assert measure.errors(run[:end], end) == (None, None)
 
 
-def test_energy_drift_of_a_run_that_stands_still():
+def test_the_energy_drift_of_a_run_at_rest_is_against_the_full_order_energy():
     """It keeps its initial energy; the full-order run falls and keeps the energy of its springs."""
     measure = yardstick({"effect": "damping", "rate": 2.0})
     own = measure.series["energy"]

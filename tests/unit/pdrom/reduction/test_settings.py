@@ -76,7 +76,7 @@ def test_a_setting_is_timed_in_its_unknowns_from_states_of_all_vertices(scene):
     assert variant.output(own.positions) == pytest.approx(scene.mesh.points)
 
 
-def test_the_best_settings_are_those_that_no_other_beats():
+def test_the_best_settings_are_those_that_no_other_setting_dominates():
     error, cost = [1.0, 0.5, 0.5, 0.7, np.inf, 0.1], [1.0, 2.0, 2.0, 3.0, 0.5, 9.0]
     assert settings.pareto(error, cost) == [True, True, True, False, True, True]
     assert settings.pareto([], []) == []

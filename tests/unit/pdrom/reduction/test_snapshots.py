@@ -60,7 +60,7 @@ def collected(runs, frames=TRAIN, **paths):
     return snapshots.collect(files["train"], files["held"], scene.groups[0], scene.masses, frames)
 
 
-def test_the_training_and_test_snapshots_hold_their_frames(runs):
+def test_training_and_test_snapshots_contain_their_frames(runs):
     scene, folder = runs
     group, got = scene.groups[0], collected(runs)
     np.testing.assert_array_equal(got.frames["train"], TRAIN)

@@ -100,7 +100,7 @@ def test_every_obstacle_is_packed_with_its_surface():
     ],
     ids=["beside", "far away", "larger than the run"],
 )
-def test_an_obstacle_near_the_run_is_shown_whole(obstacle, whole):
+def test_an_obstacle_near_the_run_is_shown_completely(obstacle, whole):
     run = np.random.default_rng(0).uniform(-0.5, 0.5, (3, 20, 3))
     effects = [effect_config({"effect": "sphere", **obstacle}, 0)]
     low, high = shown_region(run, effects)
@@ -140,7 +140,7 @@ def test_no_title_ends_a_script_of_the_page(tmp_path):
         ([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]], [0.0, 1.0, 0.0]),
     ],
 )
-def test_up_is_against_gravity_and_the_eye_turns_with_it(pulls, up):
+def test_up_is_opposite_to_gravity_and_the_camera_follows_it(pulls, up):
     effects = [{"effect": "gravity", "acceleration": pull} for pull in pulls]
     view = pack_scene(viewed(effects=effects))["view"]
     assert view["up"] == pytest.approx(up)
@@ -149,7 +149,7 @@ def test_up_is_against_gravity_and_the_eye_turns_with_it(pulls, up):
 
 
 @given(st.tuples(*3 * [st.floats(-1.0, 1.0)]).filter(lambda v: np.linalg.norm(v) > 0.1))
-def test_the_rotation_takes_y_there_and_mirrors_nothing(direction):
+def test_the_rotation_maps_y_to_the_given_direction_without_mirroring(direction):
     up = np.array(direction) / np.linalg.norm(direction)
     found = rotation_to(up)
     assert found @ Y == pytest.approx(up, abs=1e-9)

@@ -84,7 +84,7 @@ def test_a_scene_has_a_row_for_every_setting_mesh_and_trajectory(written, table)
     pd.testing.assert_series_equal(found.sort_index(), ratio.sort_index(), **same)
 
 
-def test_errors_of_a_scene_are_against_the_converged_step(table):
+def test_errors_of_a_scene_are_relative_to_the_converged_step(table):
     table = table[(table.motion == "heldout") & (table.training_motions.fillna(1) == 1)]
     case = table.set_index(["method", "substeps", "iterations"]).sort_index()
     assert (case.frames == 8).all()

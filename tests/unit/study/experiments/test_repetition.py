@@ -126,7 +126,7 @@ def fall():
     return load_bound_scene(ROOT, "bend_fall", Coarsen(resolution=0.4, frames=0.4))
 
 
-def test_a_flat_mesh_may_keep_its_plane(fall):
+def test_perturbations_of_a_flat_mesh_may_stay_in_its_plane(fall):
     assert module.kinds(fall) == (module.ALL, module.PLANE, module.VERTEX)
     curved = load_bound_scene(ROOT, "bend_curved", Coarsen(resolution=0.4))
     assert module.kinds(curved) == (module.ALL,)

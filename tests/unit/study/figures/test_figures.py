@@ -43,7 +43,7 @@ def texts(figure: Figure) -> list[str]:
     return [text for text in found if text]
 
 
-def test_every_figure_is_written_without_warnings_and_its_panels_hold_data(
+def test_every_figure_is_written_without_warnings_and_its_panels_contain_data(
     study, figure_name, tmp_path
 ):
     """Positions have few digits, because the layout's solver differs in the last bits.

@@ -39,7 +39,7 @@ def test_elements_are_drawn_where_they_lie(group, mesh, kind):
         element_map(group, mesh, count + 1, "file")
 
 
-def test_boundary_triangles_take_the_value_of_their_tetrahedron():
+def test_boundary_triangles_have_the_value_of_their_tetrahedron():
     mesh = bar(4, 3, 3)
     elements = element_map("tetrahedron_strain", mesh, len(mesh.tetrahedra), "file")
     owner = elements.face_values(np.arange(len(mesh.tetrahedra)))

@@ -149,7 +149,7 @@ def test_a_figure_has_two_numbers_and_a_name(name, preprint):
     "asked",
     ["figure teaser -n --configfile my.yaml", "--configfile=my.yaml -n -- figure teaser"],
 )
-def test_a_figure_may_stand_before_and_behind_options(asked):
+def test_a_figure_may_be_named_before_and_after_options(asked):
     command = CommandLine(completed(asked.split()))
     assert (command.configfiles, command.plans) == (("my.yaml",), True)
     assert command.targets == ("results/studies/my/figures/teaser.pdf",)

@@ -115,7 +115,7 @@ def test_an_unknown_module_is_named():
         fingerprint("pdrom.nothing")
 
 
-def test_a_fingerprint_covers_what_its_modules_import_and_the_packages_around_it():
+def test_a_fingerprint_covers_imported_modules_and_their_packages():
     """`workflow.test_snakefile` edits their code or words."""
     spring, bending = (f"pdrom.model.constraints.{name}" for name in ("spring", "bending"))
     found, more = (closure("study.experiments.fom", *added) for added in ((), (spring,)))

@@ -107,7 +107,7 @@ def test_a_run_gets_the_exit_status_of_a_job(tmp_path):
     assert done.stderr.endswith("ZeroDivisionError: division by zero\n")
 
 
-def test_a_job_that_ends_well_waits_for_its_threads_and_writes_what_it_printed(tmp_path):
+def test_a_successful_job_waits_for_its_threads_and_writes_its_output(tmp_path):
     code = f"""
 import sys, threading
 begun = threading.Event()

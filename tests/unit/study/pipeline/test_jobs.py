@@ -28,7 +28,7 @@ def plan(**changes) -> Plan:
     return Plan(Study(CONFIG | changes, ROOT), Folders("out"))
 
 
-def test_every_table_finds_what_it_reads_in_the_order_of_the_study():
+def test_every_table_finds_its_inputs_in_the_order_of_the_study():
     made = {job.artifact.name: job for job in plan().fixed["tables"]}
     for name, table in declared().items():
         assert made[name].inputs.keys() | made[name].settings.keys() == table.reads.keys()

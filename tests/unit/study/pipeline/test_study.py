@@ -20,7 +20,7 @@ def study(**sections) -> Study:
     return Study(STUDY | sections, ROOT)
 
 
-def test_short_runs_are_planned_where_the_study_holds_them():
+def test_short_runs_are_planned_for_the_scenes_that_the_study_lists():
     asked = {"scenes": ["strain_oop", "bar_release"], "ranks": [6, 20]}
     made = study(stability=asked)
     assert labels_of(made, paths.STABILITY) == [{"scene": "strain_oop"}]

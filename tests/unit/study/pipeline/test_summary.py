@@ -28,7 +28,7 @@ def project(tmp_path, monkeypatch):
     write_table(claims, TABLES[0])
 
 
-def test_a_whole_study_names_its_configuration_verdicts_and_results():
+def test_a_finished_study_prints_its_configuration_verdicts_and_results():
     listed = {"figures": FIGURES, "tables": TABLES}
     fixed = {k: [SimpleNamespace(outputs={"": path}) for path in v] for k, v in listed.items()}
     plan = SimpleNamespace(folders=Folders(), fixed=fixed, tables=["claims"], absent="")

@@ -118,7 +118,7 @@ def test_a_run_is_accurate_if_both_errors_and_the_error_of_the_reference_are_sma
 NO_RUNS = pd.DataFrame(columns=["scene", "perturbation", "frame", "relative_difference"])
 
 
-def test_effects_are_joined_in_one_time():
+def test_effects_are_combined_into_one_time():
     rows = [(scene, *row) for scene in "ab" for row in (("spring", 2.0), ("bending", 6.0))]
     costs = frame("scene effect ms_per_frame", *rows).assign(elements=3, share=0.5)
     times, none = pd.DataFrame({"scene": ["b"], "ms_per_frame": [3.0]}), pd.DataFrame()

@@ -252,7 +252,7 @@ def points(files, runs, other) -> pd.DataFrame:
     return accuracy_cost(runs, files["timings"], NOT_TIMED, other, {"a": 10, "b": 20})
 
 
-def test_accuracy_cost_compares_all_runs_with_the_converged_one(files):
+def test_accuracy_cost_compares_all_runs_with_the_converged_run(files):
     """The run with the scene's iterations occurs twice; acceleration beats 40 iterations."""
     table = points(files, reduced_reruns(**files), sweep())
     columns = ["scene", "method", "iterations", "vertices", "ms_per_frame", "pareto"]

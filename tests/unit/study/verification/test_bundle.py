@@ -33,7 +33,9 @@ def clone(tmp_path):
     return tmp_path
 
 
-def test_an_archive_holds_the_commit_and_the_results_in_equal_bytes(clone, tmp_path, monkeypatch):
+def test_an_archive_contains_the_commit_and_the_results_in_equal_bytes(
+    clone, tmp_path, monkeypatch
+):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1000")
     (clone / "untracked.txt").write_text("mine\n")
     made = {"b": clone / "run", "a.txt": clone / "sub" / "text.md"}

@@ -13,7 +13,7 @@ from study.tables import declared
 TINY = ["--configfile", "config/tiny.yaml"]
 
 
-def test_every_command_makes_what_its_entry_names_and_every_column_is_described(
+def test_every_command_makes_the_files_of_its_entry_and_every_column_is_described(
     subject, monkeypatch
 ):
     monkeypatch.chdir(ROOT)

@@ -20,7 +20,7 @@ def frame(tracked):
     return tracked[TABLE.name].head(20)
 
 
-def test_a_reference_comes_back_without_times_and_a_large_one_is_packed(
+def test_a_reference_is_read_without_times_and_a_large_one_is_compressed(
     frame, tmp_path, monkeypatch
 ):
     read = []

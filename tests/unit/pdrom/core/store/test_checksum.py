@@ -34,7 +34,7 @@ def result(request, tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("result") / request.param
     write_result(path)
     assert store.check_file(path) == "intact"
-    # only HDF5 files contain their own checksum
+    # only HDF5 files contain their checksum
     beside = [] if path.suffix == ".h5" else [store.checksum_path(path)]
     assert [p for p in path.parent.iterdir() if p != path] == beside
     return path

@@ -33,7 +33,7 @@ def test_arrays_of_rows_begin_at_a_multiple_of_a_row(count, rng):
     assert [array.ctypes.data % (8 * WIDTH) for array in arrays] == [0] * len(arrays)
 
 
-def test_a_view_of_rows_is_shared_and_nothing_else_is(rng):
+def test_only_a_view_of_rows_is_shared(rng):
     y = rows.as_vertices(rng.standard_normal((7, 3)))
     assert rows.shares(y, rows.flat(y))
     assert np.array_equal(rows.unflat(rows.flat(y)), y)

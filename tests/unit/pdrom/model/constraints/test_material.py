@@ -50,7 +50,7 @@ OWN, BARE = {"weight": 1.0}, {"effect": "strain", "thickness": 1e-3}
      ([{"effect": "area"} | OWN, SHEET], "twice: area, strain, area; young"),
      ([{"effect": "bending", "stiffness": 1e-3}], "(bending): unknown key 'stiffness'")],
 )  # fmt: skip
-def test_a_faulty_material_is_refused_with_its_key_and_what_is_allowed(effects, message):
+def test_a_faulty_material_is_refused_with_its_key_and_the_allowed_values(effects, message):
     with pytest.raises(ConfigurationError, match="build_scene: effects") as refused:
         build_scene(mesh=GROUPS["strain"], frames=2, effects=effects)
     assert message in str(refused.value)

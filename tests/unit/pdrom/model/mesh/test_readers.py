@@ -18,7 +18,7 @@ FACES = "3 0 1 2\n3 0 2 3\n"
 
 
 def square(path: Path, content: str | bytes) -> None:
-    """The file holds the square."""
+    """Check that the file contains the square."""
     path.write_bytes(content.encode() if isinstance(content, str) else content)
     points, triangles = read_here(path)
     assert points.dtype == np.float64
@@ -308,7 +308,7 @@ def test_msh_of_other_programs_and_of_partitions(tmp_path, content):
 
 
 def piece(count: int) -> str:
-    """A piece of a .vtu that holds the first triangles of the square, with their vertices."""
+    """A piece of a .vtu file with the first triangles of the square and their vertices."""
     points, ends = POINTS[: count + 2 if count else 0], 3 * np.arange(1, count + 1)
     names = {"": points, "connectivity": TRIANGLES[:count], "offsets": ends, "types": [5] * count}
     texts = [

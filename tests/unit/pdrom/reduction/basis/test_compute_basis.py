@@ -41,7 +41,7 @@ every_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.basis_id)
 
 @given(seed=SEEDS)
 @every_spec
-def test_modes_are_orthonormal_in_their_inner_product_and_hold_the_snapshots(spec, seed):
+def test_modes_are_orthonormal_in_their_inner_product_and_span_the_snapshots(spec, seed):
     p, mass = snapshots(seed)
     kept = p.copy(), mass.copy()
     basis = basis_of(p, spec, mass=mass)

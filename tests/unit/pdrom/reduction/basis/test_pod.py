@@ -111,8 +111,8 @@ def test_qr_gives_orthonormal_columns_whose_product_is_the_matrix(shape, scale):
 
 
 @pytest.mark.parametrize("m", [30, 70])
-def test_an_ill_conditioned_factor_is_noticed(m, monkeypatch):
-    """For m = 70 the first Cholesky factorisation fails, for 30 the departure tells.
+def test_an_ill_conditioned_factor_is_detected(m, monkeypatch):
+    """For m = 70 the first Cholesky factorisation fails; for 30 the loss of orthogonality is seen.
 
     LU with partial pivoting leaves L = -1 below the diagonal, of condition m 2^(m-1).
     """

@@ -74,7 +74,7 @@ def whole_space(scene):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_the_whole_space_repeats_the_full_order_run(name):
+def test_a_subspace_of_all_positions_repeats_the_full_order_run(name):
     scene = SCENES[name]()
     reference = trajectory(scene)
     motion = np.linalg.norm(reference[-1] - reference[0])

@@ -112,7 +112,7 @@ def measured(metric: str, accuracy: float = 0.1, **where) -> list[float]:
         ("error_trend", {"scene": "a", "method": "deim"}, []),
         ("error_trend", {"scene": "d", "method": "deim"}, [0.4]),
         ("error_trend", {"scene": "d", "method": "qdeim"}, [0.0]),
-        # blocks of different lengths, and one block alone, have no joint trend
+        # blocks of different lengths, and a single block, have no common trend
         ("trend_p_value", {"scene": "d", "method": "deim"}, []),
         # two blocks of three sizes, both ascending: one of 3!^2 possible orders
         ("repeated_trend_p_value", {"varied": "training"}, [1.0 / 36.0]),
