@@ -31,7 +31,7 @@ def browser_or_skip() -> str:
 
 @contextmanager
 def page_at(address: str, width: int, height: int) -> Iterator[Page]:
-    """Open the page at ``address``; ``said`` are its messages, ``asked`` the requested addresses."""
+    """Open the page at ``address``; ``said`` are its messages, ``asked`` its requested URLs."""
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path=browser_or_skip(), args=OPTIONS)
         page = browser.new_page(viewport={"width": width, "height": height})
