@@ -40,7 +40,6 @@ def test_an_element_that_is_not_finite_changes_no_other_element(kind, bad, rng):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_element_has_the_same_bits_whichever_elements_share_its_block(kind, rng):
-    """Elements of a block are computed in the same loops."""
     count, alone = 2 * LANES + 3, group_of(kind, 1)
     noise = rng.standard_normal((count, alone.rows_per_element, 3))
     noise *= 10.0 ** rng.uniform(-9, 1, (count, 1, 1))

@@ -116,7 +116,6 @@ def check_group(effect):
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_scene_depends_only_on_the_code_of_effects_that_it_lists(scene):
-    """An edit of another effect reruns none of its jobs."""
     config = read_scene(ROOT, scene)
     covered = set(closure("study.experiments.fom", *config.modules))
     listed = {EFFECTS[effect.effect].partition(":")[0] for effect in config.effects}

@@ -147,7 +147,6 @@ def spread(kind: str, n: int = 1800, r: int = 24) -> np.ndarray:
 @pytest.mark.parametrize("size", [1, 3, 9])
 @pytest.mark.parametrize("kind", ["even", "few", "twelve decades", "mirrored"])
 def test_qdeim_among_candidates_selects_the_elements_of_qdeim_among_all(kind, size):
-    """The mesh has far more elements than candidates."""
     v = spread(kind)
     assert qdeim_elements(v, size).tolist() == qdeim_loop(v, size)
 

@@ -118,7 +118,6 @@ def test_displacement_modes_are_the_mass_weighted_pod_up_to_the_rank_of_the_data
 
 @pytest.mark.parametrize("handles", [1, 2, 5, 12, 30])
 def test_skinning_weights_are_a_partition_of_unity(handles):
-    """For any position and size of the points."""
     points = make_scene(SPRING).mesh.points
     weights = spaces.skinning_weights(points, handles)
     assert weights.shape == (30, handles)

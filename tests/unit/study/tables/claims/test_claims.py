@@ -214,7 +214,6 @@ def test_a_claim_about_times_is_not_reversed_on_a_machine_twice_as_fast(ratios, 
 
 
 def test_the_speedup_of_an_inaccurate_run_counts_as_zero():
-    """Zero is clearly below every limit."""
     test = rule("useful_speedup", "<=", 1.0)
     for third, expected in ((0.0, HOLDS), (1.1, MACHINE)):
         assert verdicts.answer_of(test, np.array([0.0, 0.0, third, 0.9])) == expected
