@@ -186,7 +186,6 @@ def run_while_all_code_is_edited(sandbox: Sandbox, *targets: str) -> None:
 
 
 def test_a_job_ignores_edits_of_the_code_during_the_run(fresh):
-    """This holds for every job except the first one, which makes a mesh."""
     fresh.use_its_own_package()
     _, planned = fresh.snakemake("-n", "--verbose")
     meshes = set(re.findall(rf"{MICRO_RESULTS}/meshes/\w+.h5", planned))

@@ -54,7 +54,6 @@ def test_every_figure_of_the_report_opens(opened):
 
 
 def test_the_report_opens_without_a_network_and_without_an_error(opened):
-    """Tables have their titles, and statistics are drawn."""
     go_to(opened, "Tables")
     text = opened.inner_text("body")
     assert [t.name for t in declared().values() if t.title not in text] == []

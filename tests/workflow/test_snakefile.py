@@ -109,7 +109,6 @@ def test_a_fresh_clone_plans_the_complete_study_during_a_run_and_starts_none(cle
 
 
 def test_one_figure_needs_only_its_inputs(clean):
-    """It needs no table of the complete study, and only the two scenes that it draws."""
     figure = "results/figures/spring_runs.pdf"
     planned = clean.planned(figure)
     assert {p for p in planned if _stage(p) == "figures"} == {figure, figure[:-3] + "png"}

@@ -267,7 +267,6 @@ def rows_at(path: Path, key: str) -> int:
 
 
 def test_each_number_equals_that_of_the_pdf_and_links_to_its_cells(small):
-    """Compares the numbers of the macros, in order, with the rows that each link opens."""
     origins = json.loads((small.parent / "inputs" / "numbers.json").read_text(encoding="utf-8"))
     numbers, seen = {number["key"]: number for number in origins["numbers"].values()}, set()
     asked = {entry.key: entry for entry in entries(small.parent / "paper").values()}

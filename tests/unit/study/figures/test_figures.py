@@ -119,7 +119,6 @@ def test_a_diverged_run_lies_on_the_upper_edge_of_the_axes(study):
 
 
 def test_failed_starts_are_counted_below_runs_with_bases_of_rounding_errors(study):
-    """Starts with equal counts share a row; sizes beyond the rank are left out."""
     runs = [
         ("bend_fall", "bending", axes, "deim-joint", r, 9, None if axes == "plane" else 1e-12)
         for axes in ("all", "plane", "vertex")

@@ -24,7 +24,7 @@ SOURCE = '''"""Module."""
 import os
 
 LIMIT = 3
-"""What is allowed."""
+"""Allowed values."""
 
 
 class Thing:
@@ -45,7 +45,7 @@ def empty():
 
 WORDS = [
     ('"""Module."""\n', ""),
-    ('"""What is allowed."""', '"""Limit."""'),
+    ('"""Allowed values."""', '"""Limit."""'),
     ('        """Grow."""\n', ""),
     ("  # not in place", ""),
     ("import os\n", "# comment\nimport os\n\n\n"),

@@ -41,7 +41,6 @@ def test_alternatives_run_on_small_and_on_large_scenes_of_the_study():
 
 @pytest.mark.parametrize("name", ["default", "tiny"])
 def test_the_configurations_contain_everything_that_they_request(name):
-    """Every entry of these two files is planned."""
     config = read_yaml(CONFIG / "default.yaml")
     if name == "tiny":
         tiny = read_yaml(CONFIG / "tiny.yaml")

@@ -122,7 +122,6 @@ def test_the_plan_names_the_damaged_file_and_its_reader_renames_it(damage, plan)
 
 
 def test_results_of_another_run_of_older_code_or_of_other_inputs_are_noticed(plan):
-    """Each file has a valid checksum with its provenance."""
     heldout = HELDOUT.at(RESULTS, scene=SCENE)
     shutil.copy2(RUN, heldout)
     assert unfit(plan) == {heldout: FOREIGN}

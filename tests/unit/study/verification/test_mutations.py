@@ -66,7 +66,6 @@ def test_columns_of_larger_numbers_other_words_and_empty_cells_are_noticed(chang
 
 
 def test_changed_labels_and_parameters_are_noticed(expected):
-    """Each of these columns is changed in a separate row."""
     lost = []
     for good in expected:
         edited = good.e.astype(object)

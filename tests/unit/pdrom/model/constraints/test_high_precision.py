@@ -31,7 +31,6 @@ KINDS = {name: EFFECTS.load(name) for name in (*CLAMPED, *groups_on("length"))}
 
 
 def test_every_registered_group_is_tested():
-    """A new group that declares its manifold is tested without another entry."""
     assert CLAMPED == ["strain", "tetrahedron_strain", "deformation_gradient"]
     assert groups_on("length") == ["spring"]
     assert groups_on("half sphere") == ["bending"]

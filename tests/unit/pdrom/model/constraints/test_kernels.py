@@ -123,7 +123,6 @@ def test_results_of_a_group_are_in_the_element_order_of_the_mesh(effect):
 
 
 def test_compiled_iterations_add_all_groups():
-    """In several frames; without the compiled loop, Python code calls each group's kernel."""
     effects = [{"effect": name, "weight": 1e3} for name in ("bending", "spring", "strain")]
     scene = make_scene(GRAVITY, LEFT, *effects, mesh=GROUPS["bending"])
     compiled, plain = scene.stepper(), scene.stepper()

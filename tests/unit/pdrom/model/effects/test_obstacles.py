@@ -32,7 +32,6 @@ def distance(name, points):
 @pytest.mark.parametrize("name", OBSTACLES)
 @given(seed=SEEDS, size=st.floats(-3, 4), friction=st.sampled_from([0.0, 0.3, np.inf]))
 def test_no_vertex_ends_inside_an_obstacle(name, seed, size, friction):
-    """Paths of any length begin anywhere, outside or inside."""
     rng = np.random.default_rng(seed)
     before = rng.uniform(-1.5, 1.5, (200, 3))
     after = before + 10.0**size * rng.standard_normal((200, 3))
@@ -59,7 +58,6 @@ def test_paths_that_miss_the_obstacle_are_unchanged(name, seed, size):
 @pytest.mark.parametrize("name", OBSTACLES)
 @pytest.mark.parametrize("path", [0.0, 5e-324, 1e-300])
 def test_a_path_of_length_zero_is_no_special_case(name, path):
-    """The path lies inside, outside or on the surface of the box."""
     before = np.array([[0.0, 0.0, 0.0], [5.0, 5.0, 5.0], [0.7, 0.0, 0.0], [0.7, 0.6, 0.5]])
     after = before + path
     ended = after.copy()

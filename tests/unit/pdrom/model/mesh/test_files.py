@@ -60,7 +60,6 @@ def test_readers_of_meshes_open_no_second_file(tmp_path, monkeypatch):
 
 
 def test_a_mesh_file_that_takes_too_long_is_refused(square, monkeypatch):
-    """The limit of processor time ends the reading process."""
     limited(monkeypatch, seconds=1)
     replaced(monkeypatch, "import resource\nresource.setrlimit(0, (1, 1))\nwhile True:\n    pass")
     with pytest.raises(MeshError, match=r"square\.obj: .*(1 s of processor time|signal 9)"):

@@ -112,7 +112,6 @@ def test_fixed_vertices_have_their_prescribed_positions_exactly(name, kind, made
 
 @pytest.mark.parametrize(("vertices", "columns"), [(3, 1), (512, 4), (1300, 7)])
 def test_positions_in_single_precision_are_columns_times_coordinates(vertices, columns):
-    """The sizes are below, at and above those of the panels."""
     rng = np.random.default_rng(1)
     B, z = rng.standard_normal((vertices, columns)), rng.standard_normal((columns, 3))
     np.testing.assert_allclose(models.Output(B)(z), B @ z, rtol=0.0, atol=1e-5)
