@@ -94,8 +94,10 @@ class MethodSpec(BasisSpec):
         solved, basis = f"solve = '{self.solve}'", f"{self.layout}, {self.centring}"
         if self.rows == "joint" and self.selection != "greedy":
             raise ValueError(f"{rows} with selection = '{self.selection}': only 'greedy'")
-        if square and (self.rows == "element" or self.repeat_rows):
+        joint = self.rows == "joint" and not self.per_axis  # three equations for each unknown
+        if square and (self.rows == "element" or self.repeat_rows or joint):
             fault = "repeat_rows" if self.repeat_rows else rows
+            fault += ", coefficients = 'shared'" if joint else ""
             raise ValueError(f"{fault} with {solved}: allowed are qr, tikhonov")
         if self.oversampling > 1 and (square or self.rows == "all"):
             raise ValueError(

@@ -11,6 +11,7 @@ from pdrom.reduction.method import MethodSpec
     [
         {"rows": "joint", "selection": "pivoted-qr"},
         {"rows": "element", "solve": "square"},
+        {"rows": "joint", "solve": "square", "coefficients": "shared"},
         {"rows": "scalar", "layout": "per-axis"},
         {"rows": "element", "centring": "mean-in-modes", "coefficients": "shared"},
         {"rows": "scalar", "coefficients": "per-axis"},
