@@ -60,7 +60,7 @@ def _draw(scene: ViewedScene) -> Figure:
         Row(label, scene.mesh, [replace(p, obstacles=bodies) for p in row], windows, full, CAMERA)
         for label, row in zip(labels, every, strict=True)
     ]
-    return draw_rows(rows, height_limit=np.inf)
+    return draw_rows(rows, row_limit=np.inf)
 
 
 def _panel(number: int, run: ViewedRun, frame: int) -> RunPanel:

@@ -135,7 +135,7 @@ def centre_note(ax: Axes, text: str, colour: str = "#666666") -> None:
     )  # fmt: skip
 
 
-HEIGHT_LIMIT = 9.3  # inches, text height of a page
+ROW_LIMIT = 1.2  # inches, so that a page has space for six rows and their caption
 LEFT = 1.0  # inches, width of the row labels
 ABOVE, LINE, BELOW = 0.19, 0.13, 0.07  # inches: heights of a title, a text line, a gap
 
@@ -176,13 +176,13 @@ class Row:
         return max(counts)
 
 
-def draw_rows(rows: list[Row], height_limit: float = HEIGHT_LIMIT, footer: float = 0.0) -> Figure:
-    """Draw ``rows`` in a figure up to ``height_limit`` inches high, ``footer`` inches left free."""
+def draw_rows(rows: list[Row], row_limit: float = ROW_LIMIT, footer: float = 0.0) -> Figure:
+    """Draw ``rows``, on average up to ``row_limit`` inches high, above ``footer`` free inches."""
     columns = max(len(row.panels) for row in rows)
     width = (style.WIDTH - LEFT) / columns
     texts = footer + sum(ABOVE + BELOW + LINE * row.lines for row in rows)
     pictures = sum(0.96 * width * row.aspect for row in rows)
-    shrink = min(1.0, (height_limit - texts) / pictures)
+    shrink = min(1.0, (row_limit * len(rows) + footer - texts) / pictures)
     heights = [
         shrink * 0.96 * width * row.aspect + ABOVE + BELOW + LINE * row.lines for row in rows
     ]

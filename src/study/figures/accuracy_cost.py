@@ -114,7 +114,7 @@ def alternatives(table: pd.DataFrame) -> Figure:
     if not cases:
         raise NothingToDraw
     beside = -(-len(cases) // rows_of(len(cases), BESIDE))
-    figure, axes = small_multiples(len(cases), beside, legend_rows=3, height=1.9)
+    figure, axes = small_multiples(len(cases), beside, legend_rows=3, height=1.6)
     for (labels, case), ax in zip(cases, axes, strict=True):
         _draw_case(ax, labels, case)
     label_outer(axes, beside, "time / time of ten iterations", y="position error")

@@ -73,7 +73,7 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
         printed = f"{100.0 * rows.local_share[scene]:.0f} %"
         ax.text(2.0, y, printed, va="center", ha="left", fontsize=7.5, fontweight="bold")
         time = f"{total:.2g} ms" if total < 99.5 else f"{total:.0f} ms"
-        ax.text(102.0, y, time, va="center", ha="left", fontsize=7)
+        ax.text(102.0, y, time, va="center", ha="left", fontsize=7.5)
     ax.axvline(CLAIM, color=style.BLACK, linewidth=1.0, linestyle="--")
     ax.set(xlim=(0, 100), xticks=[0, 25, 50, 75, 100])
     ax.tick_params(axis="y", length=0)
@@ -137,7 +137,7 @@ def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """
     table = held(drawn.rows(table).query("factor == 1.0"))
     groups = [group for group in GROUPS if (table.group == group).any()]
-    figure, axes = small_multiples(len(groups), COLUMNS, legend_rows=2, height=1.8)
+    figure, axes = small_multiples(len(groups), COLUMNS, legend_rows=2, height=1.5)
     styles = drawn.styles(table)
     for ax, group in zip(axes, groups, strict=True):
         ax.set(title=style.words(group), yscale="log")

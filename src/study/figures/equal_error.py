@@ -34,7 +34,7 @@ def equal_error(table: pd.DataFrame) -> Figure:
     test trajectories of one bar only. Speed-up: time of the fastest full-order setting with at most
     the position error of the reduced model, divided by the time of this model (POD subspace, ECSW,
     five iterations, two training trajectories; without training). Each mesh has three marks, one
-    for each test trajectory; labels of large meshes give the errors of the model in this order.
+    for each test trajectory; labels on the left give errors on large meshes in this order.
     Marks are hollow for errors above 10 %. Vertical lines: bootstrap intervals over processes.
     Arrow: no full-order setting is as accurate (lower bound). Cross: the converged step is not
     accurate enough to judge. *: some rows were recorded earlier or on another machine.
@@ -55,7 +55,8 @@ def equal_error(table: pd.DataFrame) -> Figure:
         ax.grid(True)
         ax.axhline(1.0, color=style.BLACK, linewidth=1.0, zorder=0)
         ax.set(title=title, xlabel="vertices")
-        label_curves(ax, _draw(ax, table, name), (0.44 * style.WIDTH, HEIGHT - 0.85))
+        equal = ("", "", np.array([[size, 1.0] for size in sizes]))
+        label_curves(ax, [*_draw(ax, table, name), equal], (0.44 * style.WIDTH, HEIGHT - 0.85))
     style.legend(figure, style.handles(LOOKS, linestyle="none"), len(LOOKS))
     return figure
 
@@ -70,12 +71,13 @@ def _draw(ax: Axes, table: pd.DataFrame, against: str) -> list[Curve]:
             x = float(size) * BESIDE**middle * APART ** np.array(at)
             for mark, (_, row) in zip(x, rows.iterrows(), strict=True):
                 _draw_mark(ax, mark, row, against)
-            first = rows.iloc[0]
-            errors = ", ".join(f"{100.0 * error:.2g}" for error in rows.position_error)
+                ends = row[f"{against}_speedup_low"], row[f"{against}_speedup_high"]
+                labelled.append(("", "", np.array([[mark, end] for end in ends])))
+            first, large = rows.iloc[0], size > LARGE * table.vertices.max()
             text = words.scene(str(first.scene)) + ("*" if rows.recorded.notna().any() else "")
-            if size > LARGE * table.vertices.max():
-                text += f": {errors} %"
-            elif first.elements != "tetrahedra":
+            if large and against == "same":
+                text += ": " + ", ".join(f"{100.0 * e:.2g}" for e in rows.position_error) + " %"
+            elif first.elements != "tetrahedra" and not large:
                 text = ""  # the colour identifies the small sheets
             points = np.stack([x, rows[f"{against}_speedup"]], axis=1)
             labelled.append((text, LOOKS[first.elements][0], points))

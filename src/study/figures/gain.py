@@ -5,6 +5,7 @@ Columns `gain` have the DEIM constant: the norm that bounds how much interpolati
 
 from itertools import cycle
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,7 @@ from study.tables.kit.results import FAILED, judged_runs
 
 GAINS = (1.0, 1e5)  # limits of the axis of DEIM constants; points outside are on the limits
 ERRORS, LADDER_ERRORS = (1e-5, 1e2), (1e-3, 30.0)
-ENDS = ("low", "median", "high")
+ENDS, TITLE = ("low", "median", "high"), 24  # longest line of the title of a panel, characters
 DECADES = 4  # one bar per decade of the constant from 1 on, and a last bar for all larger constants
 _KEYS = ["scene", "group", "method", "r"]
 
@@ -56,8 +57,8 @@ def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
     left.set(xscale="log", xlim=GAINS, xlabel="DEIM constant")
     left.set_ylabel("position error before the horizon")
     left.axhline(FAILED, color="#333333", linewidth=0.8, linestyle="--", zorder=0)
-    left.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7)
-    left.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "blown up: upper limit", va="top", fontsize=7)
+    left.text(GAINS[1], FAILED * 1.1, "failed ", ha="right", va="bottom", fontsize=7.5)
+    left.text(GAINS[0] * 1.1, ERRORS[1] * 0.8, "blown up: upper limit", va="top", fontsize=7.5)
     _draw_decades(right, runs)
     style.legend(figure, drawn.handles(styles, linestyle="none"), 4)
     return figure
@@ -90,14 +91,13 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
     places = np.arange(len(decades))
     ax.bar(places, 100.0 * decades["mean"], width=0.7, color=style.FAILED, alpha=0.75)
     for place, count, share in zip(places, decades["size"], decades["mean"], strict=True):
-        ax.text(place, 100.0 * share + 1.5, f"{count}", ha="center", fontsize=7)
+        ax.text(place, 100.0 * share + 1.5, f"{count}", ha="center", fontsize=7.5)
     spans = {upper: rf"$10^{{{upper - 1}}}$ to $10^{{{upper}}}$" for upper in decades.index}
     spans |= {upper: rf"over $10^{{{DECADES}}}$" for upper in spans if upper > DECADES}
     ax.set_xticks(places, list(spans.values()))
     ax.set(ylim=(0, 112), yticks=[0, 25, 50, 75, 100])
     ax.tick_params(axis="x", labelrotation=35)
-    ax.set(xlabel="DEIM constant", ylabel="failed simulations (%)")
-    ax.set_title("above bars: simulations")
+    ax.set(xlabel="DEIM constant", ylabel="failed simulations (%)", title="above bars: simulations")
     ax.grid(True)
 
 
@@ -180,7 +180,7 @@ def _panels(
     figure, axes = small_multiples(len(shown), columns, legend_rows=legend)
     for ax, each in zip(axes, shown, strict=True):
         style.log_axis(ax, *limits)
-        ax.set_title(each.title.replace(": ", ":\n"))
+        ax.set_title(fill(each.title, TITLE))
     found = [rows[each.scene, each.group] for each in shown]
     return figure, list(zip(axes, shown, found, strict=True))
 
@@ -234,9 +234,10 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
     if not above.all():
         limit = np.sqrt(shown[~above].max() * shown[above].min()) if above.any() else VALUES[1]
         ax.axhspan(VALUES[0], limit, color=REGION, linewidth=0.0, zorder=0)
-        look = {"fontsize": 7.5, "color": "#6B675F", "style": "italic"}
+        look = {"fontsize": 7.5, "color": "#6B675F", "style": "italic", "zorder": 2}
         text = "rounding errors" if above.any() else "rounding errors only"
-        ax.text(0.03, 0.04, text, transform=ax.transAxes, **look)
+        box = {"fc": REGION, "ec": "none", "pad": 0}
+        ax.text(0.03, 0.04, text, transform=ax.transAxes, bbox=box, **look)
     ax.plot(component[above], shown[above], color=colour, linewidth=0.8)
     for mask, marks in ((above, {"color": colour}), (~above, HOLLOW | {"markeredgewidth": 0.5})):
         dots = marks | {"linestyle": "none", "markersize": 2.8, "clip_on": False}

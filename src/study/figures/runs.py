@@ -230,7 +230,7 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
                 for info in rerun_infos(path, f"{kinds[0]}/{method}")
                 if info.r in remarks
             ]
-            start = ", ".join(NOISY[kind] for kind in kinds)
+            start = ", ".join(NOISY[k] for k in kinds) if len(kinds) < len(NOISY) else "any"
             label = f"{drawn.title(method)}\nnoise: {start}\n{shown.when}"
             rows.append(shown.row(label, panels, panels))
     return rows
@@ -331,7 +331,7 @@ def teaser(drawn: Drawn, table: pd.DataFrame, **files: Files) -> Figure:
     $k$ modes, with sampled elements (ECSW). Outlines: full-order model; distant parts are cut off.
     """
     rows = [_teaser_row(drawn, each, table, files) for each in drawn.experiments]
-    return view.draw_rows(rows, height_limit=TEASER_ROW * len(rows))
+    return view.draw_rows(rows, row_limit=TEASER_ROW)
 
 
 def _teaser_row(

@@ -30,7 +30,7 @@ SCENES = f"strain_oop strain_twist_twin spring_stretch bar_release {MESHES}"
 STEPS, COLUMNS = 6, 3  # selection steps of figure `deim_iterations`, and panels in a row
 ENTRIES = 20  # basis size in figure `deim_entries`; the largest size where there is no such basis
 INSTANTS, MODES = (0.15, 0.5, 0.85), 4  # instants as fractions of a run; number of modes
-ROW_HEIGHT = 1.85  # height of a row of panels, inches
+ROW_HEIGHT = 1.6  # height of a row of panels, inches
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ def _draw_counts(ax: Axes, hit: np.ndarray, per_element: int) -> None:
     values = np.zeros(per_element, dtype=int)
     values[: len(counts) - 1] = counts[1 : per_element + 1]
     bars = ax.bar(np.arange(1, per_element + 1), values, color=style.ORANGE, width=0.7)
-    ax.bar_label(bars, labels=[str(v) if v else "" for v in values], fontsize=7, padding=1)
+    ax.bar_label(bars, labels=[str(v) if v else "" for v in values], fontsize=7.5, padding=1)
     ax.set(xlim=(0.3, per_element + 0.7), ylim=(0, 1.18 * values.max()))
     ax.set_xticks(np.arange(1, per_element + 1))
     ax.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=4))
@@ -222,8 +222,8 @@ def _draw_evaluations(
 
 
 # (left edge, width, height) of the four drawn matrices, inches; their upper edges are aligned.
-BLOCKS = ((0.75, 1.6, 1.9), (2.8, 1.6, 1.9), (4.8, 0.85, 0.85), (6.0, 0.85, 0.85))
-SIGNS = ((2.575, "="), (4.6, "×"), (5.825, "×"))
+BLOCKS = ((0.75, 1.45, 1.9), (2.65, 1.45, 1.9), (4.55, 0.8, 0.8), (5.65, 0.8, 0.8))
+SIGNS = ((2.36, "="), (4.33, "×"), (5.5, "×"))
 ABOVE, TITLE, FOOTER = 0.36, 0.34, 0.44  # heights, inches: two text lines, title, colour scale
 LEFT, TALLEST = 0.75, 1.45  # left edge and largest height of pictures of the mesh, inches
 

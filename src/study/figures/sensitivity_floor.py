@@ -72,10 +72,8 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
         ax.plot(*points[last - 1 :].T, ":", color=colour, linewidth=1.0)
         if end is not None:
             ax.plot(*points[end], "o", color=colour, markersize=5.0, zorder=5)
-        found = "predictable" if end is None else f"horizon {end}"
-        labelled.append((f"{words.scene(scene)}: {found}", colour, points[:: len(points) // 8 + 1]))
-    ax.set(xlabel="frame", ylabel="relative difference")
-    text = "dotted: beyond the horizon, not evaluated"
-    ax.text(0.01, 0.93, text, transform=ax.transAxes, color="#555555", fontsize=7.5)
+        found, few = "predictable" if end is None else f"horizon {end}", len(points) // 40 + 1
+        labelled.append((f"{words.scene(scene)}: {found}", colour, points[::few]))
+    ax.set(xlabel="frame (dotted: beyond the horizon, not evaluated)", ylabel="relative difference")
     label_curves(ax, labelled, (0.88 * style.WIDTH, HEIGHT - 0.5))
     return figure

@@ -12,7 +12,7 @@ from study.artifact.reads import TableOf
 from study.figures.kit.declaration import Drawn, NothingToDraw, figure
 
 RANKS = (6, 10, 20, "full")  # basis sizes; full stands for the numerical rank
-ROW = 0.145  # height of a row of cells, inches
+ROW = 0.138  # height of a row of cells, inches
 SUBSPACES = {"full": "all elements", "ecsw": "sampled elements"}
 TITLE = 13  # longest line of the title of a block, characters
 GAP = 0.45  # distance between blocks of columns, in widths of a cell
@@ -64,7 +64,7 @@ class Strip:
             width = len(columns)
             room = max(0.5 * (LEAST - width), 0.0)
             x += room
-            ax.text(x + 0.5 * width, -0.25, title, ha="center", va="bottom", fontsize=7)
+            ax.text(x + 0.5 * width, -0.25, title, ha="center", va="bottom", fontsize=7.5)
             for k, cells in enumerate(columns.values()):
                 ticks.append(x + k + 0.5)
                 for i, key in enumerate(self.rows):
@@ -74,12 +74,11 @@ class Strip:
             x += width + room + GAP
         ax.set(xlim=(0.0, x - GAP), ylim=(len(self.rows), 0.0))
         texts = [label for columns in self.blocks.values() for label in columns]
-        ax.set_xticks(ticks, texts, fontsize=7)
+        ax.set_xticks(ticks, texts, fontsize=7.5)
         places = [i + 0.5 for i in range(len(self.rows))]
-        ax.set_yticks(places, list(self.rows.values()), fontsize=7)
+        ax.set_yticks(places, list(self.rows.values()), fontsize=7.5)
         ax.tick_params(length=0, pad=2)
-        ax.set_xlabel(self.xlabel, fontsize=7)
-        ax.set_ylabel("scene", fontsize=7)
+        ax.set_xlabel(self.xlabel, fontsize=7.5)
         ax.spines[:].set_visible(False)
         return drawn
 
@@ -92,7 +91,7 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
     ax.add_patch(Rectangle((x, y), 1.0, 1.0, facecolor=look.face, **edge))
     mark = f"{int(found.blowup_frame)}" if look.mark == "frame" else look.mark
     if mark:
-        ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=7, color=look.ink)
+        ax.text(x + 0.5, y + 0.52, mark, ha="center", va="center", fontsize=7.5, color=look.ink)
 
 
 @figure(title="Outcome of every reduced simulation", reads={"table": TableOf("stability")})
@@ -124,7 +123,7 @@ def stability_map(drawn: Drawn, table: pd.DataFrame) -> Figure:
         for outcome, look in LOOKS.items()
         if outcome in present
     ]  # fmt: skip
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7.5)
     return figure
 
 
@@ -154,8 +153,7 @@ def _subspace_strip(table: pd.DataFrame, drawn: Drawn) -> Strip:
         title = fill(f"{basis.replace('pod', 'POD')}, {title}", TITLE)
         sizes = sorted(own.k.dropna().unique())
         blocks[title] = {str(int(k)): _cells(own[own.k == k]) for k in sizes}
-    label = "number of modes k of the position subspace"
-    return Strip(rows, blocks, label)
+    return Strip(rows, blocks, "number of modes k of the position subspace")
 
 
 def _cells(rows: pd.DataFrame) -> Cells:

@@ -8,10 +8,10 @@ import numpy as np
 from pdrom.view.artists import Axes
 
 FONT = 7.5  # points
-CHARACTER, HEIGHT, OFFSET = 0.057, 0.115, 0.07  # inches: mean width, height, distance of a label
+HEIGHT, OFFSET, MARK = 0.115, 0.07, 0.03  # inches: label's height and distance, radius of a mark
 SIDES = {-1: ("right", "top"), 0: ("center", "center"), 1: ("left", "bottom")}
 # Offsets of a label in units of `OFFSET`: to the right and up.
-OFFSETS = [(1, 0), *product(SIDES, (1, -1)), (-1, 0), *product(SIDES, (2.2, -2.2))]
+OFFSETS = [(1, 0), *product(SIDES, (1, -1)), (-1, 0), *product((0, 1, -1, 3.4, -3.4), (2.2, -2.2))]
 PASSES = 3
 Curve = tuple[str, str, np.ndarray]  # label, colour, points (n, 2) in data coordinates
 Place = tuple[float, int, int, np.ndarray]  # cost, number of the point, of the offset, and box
@@ -25,16 +25,18 @@ def label_curves(ax: Axes, curves: Sequence[Curve], size: tuple[float, float]) -
     size of ``ax`` in inches; the limits of ``ax`` must have been set. Labels also avoid curves that
     have no label.
     """
+    from matplotlib.textpath import TextPath
+
     scaled = [_inches(ax, points, size) for *_, points in curves]
     ink, places = np.concatenate([_dense(points) for points in scaled]), dict[int, Place]()
-    named = [i for i, (label, *_) in enumerate(curves) if label]
-    for i in named * PASSES:
+    texts = {i: TextPath((0, 0), label, FONT) for i, (label, *_) in enumerate(curves) if label}
+    for i in [*texts] * PASSES:
         taken = [box for k, (*_, box) in places.items() if k != i]
         tried = [
-            (_cost(box, size, ink, taken) + 0.02 * preference**2, int(at), preference, box)
+            (_cost(box, size, ink, taken) + 0.002 * preference**2, int(at), preference, box)
             for at in np.flatnonzero(np.isfinite(scaled[i]).all(axis=1))
             for preference, offset in enumerate(OFFSETS)
-            for box in [_box(scaled[i][at], curves[i][0], offset)]
+            for box in [_box(scaled[i][at], texts[i].get_extents().x1 / 72.0, offset)]
         ]
         places |= {i: min(tried, key=lambda each: each[0])} if tried else {}
     for i, (_, at, preference, _) in places.items():
@@ -51,11 +53,10 @@ def _inches(ax: Axes, points: np.ndarray, size: tuple[float, float]) -> np.ndarr
     return ax.transLimits.transform(ax.transScale.transform(points)) * np.array(size)
 
 
-def _box(point: np.ndarray, label: str, offset: tuple[float, float]) -> np.ndarray:
-    """Return the lower left and upper right corner (inches) of ``label`` next to ``point``."""
-    extent = np.array([CHARACTER * len(label), HEIGHT])
-    corner = point + OFFSET * np.array(offset) + 0.5 * extent * (np.sign(offset) - 1.0)
-    return np.array([corner, corner + extent])
+def _box(point: np.ndarray, width: float, offset: tuple[float, float]) -> np.ndarray:
+    """Return the lower left and upper right corner (inches) of a label next to ``point``."""
+    corner = point + OFFSET * np.array(offset) + 0.5 * (np.sign(offset) - 1.0) * (width, HEIGHT)
+    return np.stack([corner, np.add(corner, (width, HEIGHT))])
 
 
 def _cost(
@@ -72,4 +73,4 @@ def _dense(points: np.ndarray) -> np.ndarray:
     """Return points every 0.02 inches on the lines through the finite ``points`` (n, 2)."""
     points = points[np.isfinite(points).all(axis=1)]
     lines = [np.linspace(a, b, 2 + int(np.abs(b - a).max() / 0.02)) for a, b in pairwise(points)]
-    return np.concatenate([*[points] * 3, *lines])  # marks count more than lines
+    return np.concatenate([*(points + m for m in product((-MARK, MARK), repeat=2)), *lines])
