@@ -53,13 +53,13 @@ def test_the_example_of_the_page_runs_and_is_short(tmp_path, monkeypatch, capsys
 def test_the_page_lists_every_public_name_and_no_other_function():
     functions = {n for n in api.__all__ if n[0].islower()}
     assert (
-        set(re.findall(r"`([a-z_]+)\(", PAGE.split("| name |")[1].split("| object |")[0]))
+        set(re.findall(r"`([a-z_]+)\(", PAGE.split("These functions")[1].split("The objects")[0]))
         == functions
     )
     assert len(functions) <= 12
     assert all(f"`{name}`" in PAGE for name in set(api.__all__) - functions)
     for kind in (api.Run, api.Errors, api.Model, Snapshots, Basis, Scene, Mesh, FrameReport):
-        (row,) = re.findall(rf"^\| `{kind.__name__}`.*", PAGE, re.MULTILINE)
+        (row,) = re.findall(rf"^\* `{kind.__name__}`.*", PAGE, re.MULTILINE)
         own = {field.name for field in fields(kind)}
         own |= {n for n, v in inspect.getmembers(kind) if kind is not Scene or not callable(v)}
         assert {name for name in own if name[0] != "_"} <= set(re.findall(r"`(\w+)`", row)), row
