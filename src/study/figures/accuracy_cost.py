@@ -98,15 +98,15 @@ BARE = "without vertex positions"
     timed=True,
 )  # fmt: skip
 def alternatives(table: pd.DataFrame) -> Figure:
-    r"""On most meshes a full-order setting on this or a coarser mesh is as accurate as the reduced
-    models and faster. Position error over all frames of the first test trajectory, relative to the
-    converged step on the same mesh, against the time per frame, divided by the time of ten plain
-    local/global iterations. Black: best full-order settings (grey dots: all others). Orange: best
-    settings on coarser meshes, with interpolated displacements. Green: reduced positions (ECSW)
-    trained on one or several trajectories (dotted: without the time to compute vertex positions).
+    r"""On most meshes, a full-order setting on the same or a coarser mesh is as accurate as the
+    reduced models and faster. Position error over all frames of the first test trajectory, relative
+    to the converged step on the same mesh, against the time per frame, in units of the time of ten
+    plain local/global iterations. Black: best full-order settings (grey dots: all others). Orange:
+    best settings on coarser meshes, with interpolated displacements. Green: reduced positions
+    (ECSW) trained on one or several trajectories (dotted: without the time of vertex positions).
     Dashed: replaying the training trajectory. Dash-dotted: discretisation error of the mesh, by
-    Richardson's rule, if the observed order is 0.5 to 3. $\times 100$: weights times 100. *: some
-    rows were recorded earlier or on another machine. Errors outside the axis are on its limits.
+    Richardson's rule (if the observed order is 0.5 to 3). $\times 100$: weights times 100. *: some
+    results were recorded earlier or on another machine. Errors outside the axis are on its limits.
     """
     table = table[table.motion == FIRST]
     cases = table.groupby(["scene", "factor", "stiffness"])

@@ -85,9 +85,9 @@ def _draw_bars(ax: Axes, rows: pd.DataFrame, scenes: list[str]) -> None:
 )  # fmt: skip
 def scaling(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """The time of a full-order iteration grows with the mesh much faster than the time of an
-    iteration with reduced positions. Time of one local/global iteration (solid) and of its parts
-    (other lines) against the number $N$ of vertices. Labels at the ends of curves are fitted power
-    laws, for scenes with three mesh sizes or more.
+    iteration with reduced positions. Solid: time of a complete local/global iteration for $N$
+    vertices. Other lines: its parts. All vertex positions are computed once per frame; this time is
+    divided by the number of iterations. Labels: fitted powers of $N$ (at least three mesh sizes).
     """
     scenes = drawn.scenes_of(table)
     figure, looks = style.new_figure(2.9), method_styles({*table.method})
@@ -129,11 +129,11 @@ def _draw_times(ax: Axes, rows: pd.DataFrame, looks: dict[str, tuple[str, str]])
     methods="deim deim-joint block-deim gappy", timed=True,
 )  # fmt: skip
 def break_even(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """A reduced local step is faster than the full local step up to a basis size that depends on
-    the cost of a projection. Time of the reduced local step divided by the time of the full local
-    step (both compiled, on one thread) against the number $r$ of basis vectors. Panels are kinds of
-    constraints, lines scenes and methods. Only the local step is timed, on full-order states. Above
-    the dashed line the reduced step is slower. Lines end at the numerical rank of the snapshots.
+    """Up to a basis size that depends on the cost of a projection, a reduced local step is faster
+    than the full local step. The ratio of the times (compiled, on one thread) is drawn against the
+    number $r$ of basis vectors. Above the dashed line the reduced step is slower. Each panel has
+    one kind of constraint, each line one scene and method. Local steps are timed outside of
+    simulations, at full-order positions. Lines end at the largest basis size (numerical rank).
     """
     table = held(drawn.rows(table).query("factor == 1.0"))
     groups = [group for group in GROUPS if (table.group == group).any()]

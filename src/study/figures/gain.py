@@ -34,12 +34,12 @@ _KEYS = ["scene", "group", "method", "r"]
     },
 )  # fmt: skip
 def error_against_gain(drawn: Drawn, **tables: pd.DataFrame) -> Figure:
-    """Most simulations with a large DEIM constant fail; few with a small DEIM constant do. This
+    """Most simulations with a large DEIM constant fail, and few with a small constant do. The DEIM
     constant bounds how much interpolation amplifies errors. Left: position error up to the
-    predictability horizon, relative to the full-order simulation; one mark per simulation with
-    interpolated projections whose basis suffices (orthogonal projection onto it does not fail).
-    Simulations above the dashed line (10 %) failed; arrows point to values outside the axes.
-    Crosses: median and range over random training frames. Right: share of failed simulations.
+    predictability horizon, relative to the full-order simulation; one mark per simulation whose
+    basis suffices (with the orthogonal projection onto it, the simulation does not fail). Above the
+    dashed line (10 %) simulations fail; arrows point to values outside the axes. Crosses: median
+    and range over random training frames. Right: share of simulations that fail.
     """
     runs = drawn.rows(judged_runs(tables["reruns"], tables["errors"]))
     figure = style.new_figure(3.0)
@@ -255,11 +255,11 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
     methods="pod deim deim-joint published block-deim",
 )  # fmt: skip
 def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
-    """On training frames, one system for all coordinates (entry-wise and element-wise DEIM) is
-    nearly as accurate as the orthogonal projection; the preprint's methods are less accurate.
-    Relative error of projections reconstructed from samples against the number $r$ of basis
-    vectors: for training frames, for the frames between them, and for the first test trajectory.
-    Grey: output of the preprint's code for a similar scene. Arrow heads: errors above the axis.
+    """On training frames, methods with one system for all coordinates (entry-wise and element-wise
+    DEIM) are nearly as accurate as the orthogonal projection. The preprint's selection and code are
+    less accurate. Lines: relative error of projections reconstructed from samples with $r$ basis
+    vectors, on training frames, on frames between them, and on the first test trajectory. Grey:
+    output of the preprint's code for a similar scene. Arrow heads: errors above the axis.
     """
     styles = drawn.styles(table)
     figure, panels = _panels(drawn, table, SHOWN, 3, legend=3)

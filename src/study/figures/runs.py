@@ -46,9 +46,9 @@ RUNS: dict[str, Read] = {
     **FLOORS,
 }
 COMPARED = """separate systems for x, y, z (preprint's selection) distort most simulations or make
-them blow up; element-wise DEIM is closer to the full-order model. Pictures show the full-order
-model and simulations with reduced projections, by basis size $r$, in one frame of the training
-trajectory. Grey outline: full-order model. Red frame: drawn to the smaller scale given below.
+them blow up. Element-wise DEIM is closer to the full-order model. Pictures show one frame of the
+training trajectory: the full-order model, then simulations with reduced projections by basis size
+$r$. Grey outline: full-order model. Red frame: the smaller scale is given below the picture.
 """
 
 
@@ -190,12 +190,12 @@ def strain_runs(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     scenes="bend_fall bend_poke bend_curved", methods=PAIR, groups="bending",
 )  # fmt: skip
 def bending_runs(drawn: Drawn, horizon: Horizon, noise: pd.DataFrame, **files: Files) -> Figure:
-    """The projections of the preprint's two flat sheets are rounding errors, so that a basis of
-    them is noise: the perturbed coordinates of the initial positions decide if a reduced simulation
-    fails. The projections of the curved sheet are not noise. Pictures show sheets with bending only
-    in one frame: the full-order model, then simulations with reduced projections by basis size $r$.
-    Of the perturbed starts, the first is drawn for which some sizes fail and others do not (else
-    the first of all); the number of starts that fail is below each picture.
+    """The projections of the preprint's two flat sheets are rounding errors, so a basis of them is
+    noise. A reduced simulation then fails or not depending on which coordinates of its initial
+    positions are perturbed. The projections of the curved sheet are not noise. Pictures show one
+    frame: the full-order model, then simulations with reduced projections by basis size $r$. The
+    text below a picture counts the perturbed starts that fail. The drawn start is the first for
+    which some sizes fail and others do not (else the first of all).
     """
     noise_runs = files.pop("noise_runs")
     runs, rows = Runs(drawn, horizon, RANKS, (0.6,), **files), []
@@ -243,9 +243,9 @@ def noise_rows(drawn: Drawn, shown: Shown, table: pd.DataFrame, path: str) -> li
 def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     """Reducing the strain changes this simulation little, since springs carry nearly all of the
     force. Pictures show a cloth with bending, springs and strain in frames up to its predictability
-    horizon: the full-order model, then simulations with reduced projections of one constraint group
-    by two methods. Colours are distances to the full-order model, whose outline is grey. Red frame:
-    drawn to the smaller scale given below.
+    horizon: the full-order model, then simulations in which two methods reduce the projections of
+    one constraint group. Colours show the distance to the full-order model, whose outline is grey.
+    Red frame: the smaller scale is given below.
     """
     # instants as fractions of the horizon
     runs = Runs(drawn, horizon, (20, 10, "full"), (0.5, 0.75, 1.0), **files)

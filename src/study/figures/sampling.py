@@ -62,8 +62,8 @@ def deim_iterations(
     """Each step of DEIM selects one entry, although the projection of a complete element has to be
     computed for this entry. Step $k$ interpolates mode $k$ by the modes before it at the entries
     selected so far, and selects the entry with the largest absolute residual. The colour of an
-    element is the largest residual among its entries. The ring marks the element of the entry
-    selected in this step, white dots mark elements of entries selected in earlier steps.
+    element shows the largest residual among its entries. The ring marks the element of the entry
+    selected in this step, white dots mark those of earlier steps.
     """
     experiment, method, path = drawn.experiments[0], drawn.methods[0], samples[0].path
     basis, samplings = load_basis(bases[0].path), read_samplings(path)
@@ -134,11 +134,11 @@ def iterations(
     methods="deim qdeim block-deim",
 )  # fmt: skip
 def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
-    """Entry-wise DEIM scatters its entries over almost as many elements, so that many more entries
-    are computed than used. Left: elements that it samples, coloured by the coordinate of the
-    selected entry. Middle: number of sampled elements by how many of their entries are used. Right:
-    entries that have to be computed for a basis of size $r$; a projection yields all entries of its
-    element at once.
+    """Entry-wise DEIM selects its entries in almost as many elements. It therefore computes many
+    more entries than it uses, since a projection yields all entries of its element. Left: sampled
+    elements, coloured by the coordinate of the selected entry. Middle: number of sampled elements,
+    by how many of their entries are used. Right: number of entries that are computed for a basis of
+    size $r$.
     """
     scalar = [m for m, reduction in drawn.reductions.items() if reduction.rows == "scalar"]
     read = [

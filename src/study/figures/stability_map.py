@@ -97,12 +97,12 @@ def _draw_cell(ax: Axes, x: float, y: float, found: pd.Series) -> None:
 @figure(title="Outcome of every reduced simulation", reads={"table": TableOf("stability")})
 def stability_map(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Simulations with separate systems for the coordinates (preprint's selection and code) leave
-    the scene at nearly every basis size; simulations with one system, or in position subspaces,
-    seldom do. Each cell is a simulation of the training trajectory, by method, size and scene. The
-    position error relative to the full-order simulation, up to the predictability horizon, has the
-    limit {stability.wrong}. Left the scene: the bounding box exceeds {stability.left} times the
-    largest bounding box of the full-order simulation. Blow-up: positions are not finite in the
-    printed frame. Constraint groups whose projections are rounding errors are left out.
+    the scene at nearly every basis size. Simulations with one system, or in position subspaces,
+    seldom do. Each cell is a simulation of the training trajectory. The position error, relative to
+    the full-order simulation up to the predictability horizon, has the limit {stability.wrong}.
+    Left the scene: the bounding box exceeds {stability.left} times the largest bounding box of the
+    full-order simulation. Blow-up: positions are not finite in the printed frame. Constraint groups
+    whose projections are rounding errors are left out.
     """
     table = table[(table.experiment == "rerun") & (table.group.notna())]
     strips = [_local_strip(table, drawn), _subspace_strip(table, drawn)]

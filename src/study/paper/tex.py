@@ -103,8 +103,8 @@ def _check_log(path: Path, source: Path, most: int | None) -> None:
     undefined = re.findall(r"(?:Reference|Citation) `([^']*)'[^\n]*undefined", text)
     if undefined:
         raise PaperError(f"{source}: undefined references: {', '.join(sorted(set(undefined)))}")
-    # TeX only warns if a box extends beyond the area of the text
-    overfull = [line for line in text.splitlines() if line.startswith("Overfull")]
+    # TeX only warns if a box or a table extends beyond the area of the text
+    overfull = re.findall(r"(?m)^(?:Overfull|LaTeX Warning: Float too large).*", text)
     if overfull:
         raise PaperError(f"{source}: {len(overfull)} boxes do not fit: {'; '.join(overfull)}")
     pages = re.search(r"Output written on .*\((\d+) pages?", text)

@@ -51,6 +51,7 @@ def test_the_output_folder_contains_only_the_pdf(tmp_path):
         ("Section", r"\rule{2\textwidth}{1pt} Section", r"1 boxes do not fit: Overfull \\hbox"),
         ("Section", r"\parbox{1cm}{\rule{1cm}{2\textheight}} Section",
          r"1 boxes do not fit: Overfull \\vbox"),
+        ("Section", r"\begin{table}\rule{1cm}{2\textheight}\end{table}", r"Float too large"),
     ],
 )  # fmt: skip
 def test_a_fault_gives_one_line_and_leaves_the_old_pdf(tmp_path, old, new, message):
