@@ -53,14 +53,14 @@ def curves(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
     timed=True,
 )  # fmt: skip
 def accuracy_cost(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """In this scene interpolation from three elements per mode is faster than the full-order model
-    with as few iterations as give the same error; at larger errors, reduced positions and coarser
-    meshes are faster still. Each mark is a setting: its time per frame, and its position
-    error on the training trajectory up to the predictability horizon, relative to the converged
-    step. Settings are basis sizes $r$ (interpolated projections), numbers of iterations $K$ (black:
+    """In this scene the method with three elements per mode is faster than the full-order model
+    with fewer iterations at the same error. At larger errors, reduced positions and coarser meshes
+    are faster still. Each mark is a setting. It shows the time per frame and the position error on
+    the training trajectory up to the predictability horizon, relative to the converged step.
+    Settings are basis sizes $r$ (interpolated projections), numbers of iterations (black:
     full-order model), and the best combinations of modes and tolerance (reduced positions) or of
-    mesh, iterations and acceleration (coarser mesh). A dash-dotted line is the discretisation error
-    of the mesh, where it is known. Errors outside the axis are drawn on its limits.
+    mesh, iterations and acceleration (coarser mesh). Dash-dotted line: discretisation error of the
+    mesh, if known. Errors outside the axis are drawn on its limits.
     """
     scene = drawn.scenes_of(held(table.dropna(subset=[ERROR, TIME])))[0]
     table = table[table.scene == scene]

@@ -37,12 +37,12 @@ COLUMNS = 3  # panels in a row of figure `break_even`
     scenes=f"cloth_all spring_oop strain_oop bar_release {MESHES}", timed=True,
 )  # fmt: skip
 def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """The local step takes nearly all of a frame in interpreted code; in compiled code its share
-    exceeds the 70 % of the preprint's claim C1 (dashed line) only where a projection is expensive.
-    Shares of the time of a full-order frame for three implementations of the same local step. The
-    printed percentage is the share of the local step (orange: projections; light orange: assembly
-    of the right-hand side from them; compiled code does these in one pass). Grey is the rest of the
-    frame, for example prediction and contacts. To the right of each bar is the time per frame.
+    """In interpreted code the local step takes nearly all the time of a frame. In compiled code its
+    share exceeds the 70 % of the preprint's claim C1 (dashed line) only if projections are
+    expensive. Each bar is one scene and one of three implementations of the same local step. The
+    printed percentage is the share of the local step, that is of projections (orange) and of the
+    assembly of the right-hand side (light orange); compiled code does both in one pass. Grey is the
+    remaining time, for example for contacts. To the right of each bar is the time per frame.
     """
     scenes = drawn.scenes_of(table)
     present = set(table[table.scene.isin(scenes)].implementation)

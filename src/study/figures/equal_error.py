@@ -30,14 +30,14 @@ HEIGHT = 2.6  # height of the figure, inches
 )  # fmt: skip
 def equal_error(table: pd.DataFrame) -> Figure:
     """On large meshes reduced positions with sampled elements are mostly faster than the full-order
-    model on the same mesh. If the full-order model may use coarser meshes, they are faster on all
-    test trajectories of one bar only. Speed-up: time of the fastest full-order setting with at most
-    the position error of the reduced model, divided by the time of this model (POD subspace, ECSW,
-    five iterations, two training trajectories; without training). Each mesh has three marks, one
-    for each test trajectory; labels on the left give errors on large meshes in this order.
-    Marks are hollow for errors above 10 %. Vertical lines: bootstrap intervals over processes.
-    Arrow: no full-order setting is as accurate (lower bound). Cross: the converged step is not
-    accurate enough to judge. *: some rows were recorded earlier or on another machine.
+    model on the same mesh (left). Compared with coarser meshes, too (right), the reduced model is
+    faster on all test trajectories of one bar only. Speed-up: time of the fastest full-order
+    setting with at most the position error of the reduced model, divided by the time of this model
+    (POD subspace, ECSW, five iterations, two training trajectories; without training). Each mesh
+    has a mark for each of three test trajectories; labels on the left give the errors on large
+    meshes in this order. Hollow marks: errors above 10 %. Vertical lines: bootstrap intervals over
+    processes. Arrow: no full-order setting is as accurate (lower bound). Cross: converged step too
+    inaccurate. *: some results were recorded earlier or on another machine.
     """
     table = table[table.iterations.notna() & (table.stiffness == 1.0)]
     table = held(table.dropna(subset=[f"{name}_speedup" for name in AGAINST]).sort_values(MESH))

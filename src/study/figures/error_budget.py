@@ -26,10 +26,10 @@ RING = {"markersize": 7.0, "markerfacecolor": "none"}  # the closure, around the
 @figure(title="Sources of the error of reduced models", reads={"table": TableOf("error_budget")})
 def error_budget(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """Restricting the equations to the subspace (Galerkin closure) and stopping after five
-    iterations add most of the error; sampling adds little. Deformation error of the reduced
-    model (40 POD modes) relative to the converged step, up to the predictability horizon: medians
-    over three test trajectories of each scene. Each mark adds one simplification: the subspace, the
-    restricted equations, sampled elements, five iterations. Cross: full-order model. The dashed
+    iterations add most of the error; sampling adds little. Marks: deformation errors of the reduced
+    model (40 POD modes) relative to the converged step, up to the predictability horizon, medians
+    over three test trajectories. Each mark adds one simplification to those before: the subspace,
+    the restricted equations, sampled elements, five iterations. Cross: full-order model. The dashed
     line is an error of 10 %; errors outside the axis are drawn on its limits.
     """
     table = table[table.skinning == 0]

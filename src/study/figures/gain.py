@@ -119,13 +119,13 @@ THICK = 2  # number of scenes with thick lines and printed DEIM constants
     f"bend_curved {MESHES}",
 )  # fmt: skip
 def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """One system for all coordinates and three elements per mode reduce the error most. Position
-    error of reduced simulations of the training trajectory, relative to the full-order simulation
-    and up to the predictability horizon; one line per scene. The first row has the choices of the
-    preprint's code; each further row changes one choice and keeps all earlier changes. Simulations
-    that blew up are drawn on the right limit. Thin horizontal lines: ranges over simulations with
-    randomly drawn training frames. Numbers on the right: DEIM constants (bounds on the
-    amplification of errors by interpolation) of the scenes with thick lines.
+    """One system for all coordinates and three elements per mode reduce the error most. Each line
+    is a scene: position errors of reduced simulations of the training trajectory, relative to the
+    full-order simulation, up to the predictability horizon. The first row is the preprint's code;
+    each further row makes one change and keeps all earlier changes. Simulations that blew up are
+    drawn on the right limit. Thin horizontal lines: ranges over simulations with randomly drawn
+    training frames. Numbers on the right: DEIM constants (bounds on the amplification of errors by
+    interpolation) of the scenes with thick lines.
     """
     table = held(table[table.scene.isin(drawn.scenes) & table.gain.notna()])
     table = held(table[table.direction.isin(["up", "down"])])

@@ -50,10 +50,10 @@ HEIGHT = 2.15  # height of the figure, inches
 )  # fmt: skip
 def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -> Figure:
     """In some scenes a tiny change of the initial positions grows until two full-order simulations
-    disagree. Relative difference of two full-order simulations whose initial positions differ by
-    {sensitivity.reference} of the size of the body, by frame. The predictability horizon of a scene
-    (dot) is the first frame at which the difference exceeds {sensitivity.threshold} (grey line). We
-    evaluate no simulation beyond it (dotted). Scenes without a dot are predictable to their end.
+    disagree. Lines: relative difference of two simulations whose initial positions differ by
+    {sensitivity.reference} of the body size. The horizon of a scene (dot) is the first frame at
+    which the difference exceeds {sensitivity.threshold} (grey line). We evaluate no simulation
+    beyond the horizon (dotted). Scenes without a dot are predictable to their end.
     """
     floors = floors_of(sensitivity, horizon)
     scenes = [scene for scene in drawn.scenes if len(floors[scene][0])][:MOST]
