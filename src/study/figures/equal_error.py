@@ -37,7 +37,7 @@ def equal_error(table: pd.DataFrame) -> Figure:
     has a mark for each of three test trajectories; labels on the left give the errors on large
     meshes in this order. Hollow marks: errors above 10 %. Vertical lines: bootstrap intervals over
     processes. Arrow: no full-order setting is as accurate (lower bound). Cross: converged step too
-    inaccurate. *: some results were recorded earlier or on another machine.
+    inaccurate. *: partly recorded earlier or on another machine.
     """
     table = table[table.iterations.notna() & (table.stiffness == 1.0)]
     table = held(table.dropna(subset=[f"{name}_speedup" for name in AGAINST]).sort_values(MESH))
