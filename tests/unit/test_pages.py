@@ -110,7 +110,7 @@ def test_effects_and_selections_are_listed_and_those_that_no_subspace_accepts() 
     page, text = (CONFIG / "README.md").read_text("utf-8"), ADDING.read_text("utf-8")
     (sentence,) = re.findall(r"^Effects: (.*?)\.\n", text, re.MULTILINE | re.DOTALL)
     assert sorted(re.findall(r"`(\w+)`", sentence)) == sorted(EFFECTS)
-    (others,) = re.findall(r"^Models in position .* support all effects but (.*?),", page, re.MULTILINE)
+    (others,) = re.findall(r"^Models in .* support all effects but (.*?),", page, re.MULTILINE)
     refused = {name for name in EFFECTS if not EFFECTS.load(name).in_subspace}
     assert set(re.findall(r"`(\w+)`", others)) == refused
     selections = page.split("### Selections")[1].split("\n###")[0]

@@ -141,7 +141,7 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> Run:
     path = file_path(path)
     with opened(path, "run", unchecked) as file:
         if "positions" not in file or "timings" not in file:
-            raise StorageError(f"{path}: holds no complete run; pdrom show tells its contents")
+            raise StorageError(f"{path}: contains no complete run; pdrom show lists its contents")
         found = stored_run(_scene(file, path), file)
         _require_consistent(found)
         return found
@@ -151,7 +151,7 @@ def load(path: str | os.PathLike[str], unchecked: bool = False) -> Run:
 def opened(path: Path, what: str, unchecked: bool = False) -> Iterator[h5py.File]:
     """Open the file ``path`` to read a ``what`` from it; StorageError if the file is invalid."""
     if path.is_file() and not h5py.is_hdf5(path):
-        raise StorageError(f"{path}: holds no {what}: it is not an HDF5 file")
+        raise StorageError(f"{path}: contains no {what}, because it is not an HDF5 file")
     try:
         with store.open_hdf5(path, unchecked) as file:
             store.require_self_contained(file, path)
@@ -160,7 +160,7 @@ def opened(path: Path, what: str, unchecked: bool = False) -> Iterator[h5py.File
         raise
     except (PdromError, ValueError, TypeError, LookupError, RuntimeError, AttributeError) as error:
         fault = " ".join(str(error).split())[:200]
-        raise StorageError(f"{path}: holds no valid {what} ({fault})") from error
+        raise StorageError(f"{path}: contains no valid {what} ({fault})") from error
 
 
 def _require_consistent(found: Run) -> None:

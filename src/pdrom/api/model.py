@@ -365,7 +365,7 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     path = files.file_path(path)
     with files.opened(path, "model") as file:
         if "model" not in file or "format" not in file.attrs:
-            raise StorageError(f"{path}: holds no model; pdrom show tells its contents")
+            raise StorageError(f"{path}: contains no model; pdrom show lists its contents")
         if (version := int(file.attrs["format"])) > FORMAT:
             raise StorageError(f"{path}: format {version} needs a newer pdrom (known: {FORMAT})")
         return _model(file, json.loads(file.attrs["configuration"])["scene"], str(path))

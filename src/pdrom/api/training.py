@@ -80,9 +80,9 @@ def arguments(scene: Scene, given: Mapping[str, Any]) -> Arguments:
     }
     for what, (applies, wrong) in apart.items():
         if applies and wrong:
-            raise ConfigurationError(f"train: {', '.join(sorted(wrong))}: no effect {what}")
+            raise ConfigurationError(f"train: omit {', '.join(sorted(wrong))}: no effect {what}")
     if asked.error is not None and not asked.validate_:
-        raise ConfigurationError("train: error: a validation trajectory is required (validate)")
+        raise ConfigurationError("train: error requires validate (validation trajectories) >= 1")
     for name in ("selection", "progress"):
         if (function := given.get(name)) is not None and not callable(function):
             raise ConfigurationError(f"train: {name} = {shown(function, 60)}: not a function")
@@ -184,7 +184,7 @@ def _full_order(run: Any) -> Run:
     files.require_run(run, "full")
     if not run.full_order or run.blowup_frame is not None:
         ended = "" if run.blowup_frame is None else f", which blew up in frame {run.blowup_frame}"
-        raise ConfigurationError(f"full: {run.title}{ended}: a complete full-order run is required")
+        raise ConfigurationError(f"{run.title}{ended}: training needs complete full-order runs")
     return run
 
 

@@ -38,7 +38,7 @@ def text(metavar: str, what: str, **more: Any) -> dict[str, Any]:
 
 def number(default: float | None, what: str) -> dict[str, Any]:
     """Return argparse keywords of a numeric option; the help shows its ``default`` if not None."""
-    shown = what if default is None else f"{what} ({default:g})"
+    shown = what if default is None else f"{what} (default: {default:g})"
     return {"type": int if isinstance(default, int) else float, "default": default, "help": shown}
 
 
@@ -49,7 +49,7 @@ def flag(what: str) -> dict[str, Any]:
 
 # Arguments that several commands have.
 SCENE = text("SCENE.yaml", "scene file")
-UNCHECKED = flag("read a run without a checksum (of an older pdrom) if its data are valid")
+UNCHECKED = flag("accept runs without a checksum, which older versions of pdrom wrote")
 
 
 def require_output(path: str | Path, reads: Sequence[str], scene: "Scene | None" = None) -> None:
@@ -63,5 +63,5 @@ def require_output(path: str | Path, reads: Sequence[str], scene: "Scene | None"
     if scene and isinstance(scene.config.mesh, MeshFile):
         reads = [*reads, str(scene.config.mesh.file(Path(reads[0]).parent))]
     if any(Path(path).resolve() == Path(read).resolve() for read in reads):
-        raise StorageError(f"{path}: this command reads the file; name another output")
+        raise StorageError(f"{path}: the output would replace a file that is read; rename it")
     require_own(path)

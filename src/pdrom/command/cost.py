@@ -47,8 +47,8 @@ def shown(table: "pd.DataFrame", frames: int) -> str:
     busy, error = table.attrs["busy"], table.attrs["mesh_error"]
     lines = [
         table.assign(**columns)[[*columns]].to_string(index=False),
-        "* best: every other setting is slower or has a larger position error",
-        f"relative errors against converged time steps over {frames} frames; times of the first "
+        "* no other setting has both a smaller position error and a shorter time",
+        f"errors: relative to converged time steps, over {frames} frames; times: of the first "
         f"{table.attrs['frames']} frames{', unreliable: other programs ran' * busy}",
     ]
     if error is not None:
@@ -58,7 +58,7 @@ def shown(table: "pd.DataFrame", frames: int) -> str:
 
 
 COMMAND = Command(
-    "Compare solver iterations, coarser meshes and reduced models of a scene by error and time",
+    "Compare error and time of iterations, coarser meshes and reduced models of a scene",
     "pdrom cost bar.yaml --coarser coarse.msh --model bar.model.h5 --plot cost.png",
     {
         "scene": SCENE,

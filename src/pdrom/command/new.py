@@ -32,13 +32,13 @@ def perform(arguments: argparse.Namespace) -> Status:
     from pdrom.api.files import require_no_mesh
 
     if arguments.scene is None and arguments.mesh is None:
-        raise ConfigurationError("nothing to write: name a SCENE file, or a mesh by --mesh")
+        raise ConfigurationError("no file name: give the scene file to write, or a mesh (--mesh)")
     path = Path(arguments.scene or Path(arguments.mesh).with_suffix(".yaml"))
     require_no_mesh(path)
     path = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
     merge = arguments.merge
     if merge and not arguments.mesh:
-        raise ConfigurationError("--merge: no mesh to merge vertices of; add --mesh")
+        raise ConfigurationError("--merge: only for mesh files; add --mesh FILE")
     file, mesh = _read(arguments.mesh, path, merge) if arguments.mesh else (None, None)
     text = template(path.stem, file, mesh, arguments.up, merge)
     try:
@@ -173,13 +173,13 @@ def _floor(mesh: "Mesh", axis: int) -> str:
 
 
 COMMAND = Command(
-    "Write a commented scene file to start from",
+    "Write a scene file with comments, which you can edit",
     "pdrom new sheet.yaml --mesh sheet.obj",
     {
-        "scene": text("SCENE", "file to write (default: next to the mesh)", nargs="?"),
-        "--mesh": text("FILE", "mesh (.obj, .vtu, .msh ...; default: a sheet)"),
+        "scene": text("SCENE", "scene file to write (default: the name of the mesh)", nargs="?"),
+        "--mesh": text("FILE", "mesh file (.obj, .vtu, .msh ...; default: a generated sheet)"),
         "--merge": number(0.0, "merge vertices closer than this fraction of the mesh's extent"),
-        "--up": {"choices": "xyz", "default": "y", "help": "axis of the mesh that points up (y)"},
+        "--up": {"choices": "xyz", "default": "y", "help": "upward axis (default: y)"},
     },
     perform,
 )

@@ -39,7 +39,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     model = load_model(part) if part else None
     reference = load(arguments.compare, arguments.unchecked) if arguments.compare else None
     if reference and not (reference.full_order and reference.scene.config == scene.config):
-        fault = f"{reference.title} is no full-order run of this scene"
+        fault = f"{reference.title} is not a full-order run of {file}"
         raise ConfigurationError(f"--compare {arguments.compare}: {fault}")
     tick = Progress(scene.config.name, scene.config.frames)
     start = load(arguments.start, arguments.unchecked) if arguments.start else None
@@ -77,10 +77,10 @@ COMMAND = Command(
         "scene": SCENE,
         "--model": text("MODEL", "reduced model from pdrom train"),
         "--compare": text("RUN.h5", "full-order run to compare the reduced run with"),
-        "--from": text("RUN.h5", "run that this scene continues", dest="start"),
-        "--frame": text("N", "with --from: continue after N frames (default: all)", type=int),
+        "--from": text("RUN.h5", "run that is continued with this scene", dest="start"),
+        "--frame": text("N", "with --from: frames of that run to keep (default: all)", type=int),
         "--out": text("FILE", "HDF5 file to write (default: SCENE.h5 or SCENE_MODEL.h5)"),
-        "--check": flag("estimate the error by a second run with more iterations"),
+        "--check": flag("estimate the error of the run by a second run with more iterations"),
         "--no-estimate": flag("do not estimate the error of every 20th frame"),
         "--unchecked": UNCHECKED,
     },

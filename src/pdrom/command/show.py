@@ -15,7 +15,7 @@ import yaml
 
 from pdrom.command.base import Command, Status, flag, text
 from pdrom.core import config_file
-from pdrom.core.errors import ConfigurationError, StorageError, choices
+from pdrom.core.errors import ConfigurationError, StorageError, suggestion
 from pdrom.core.provenance import RECORD
 from pdrom.core.yamlfile import named, read_yaml, validate
 
@@ -62,7 +62,8 @@ def _explained(word: str) -> list[str]:
             lines.append((text, [name, key, *filter(None, parts[2].split(" or "))]))
     found = [line for line, words in lines if word in words]
     if not found:
-        known = choices(word, dict.fromkeys(each for _, words in lines for each in words))
+        known = suggestion(word, (each for _, words in lines for each in words))
+        known = known or "; `pdrom show scene` and `pdrom show effect` list words"
         raise ConfigurationError(f"'{word}': neither a file nor a word of scene files{known}")
     return found
 
@@ -77,7 +78,7 @@ def _hdf5(path: Path, whole: bool) -> Iterator[str]:
             file.visititems(lambda name, item: found.extend(_item(name, item)))
     except OSError as error:
         raise StorageError(f"{path}: not a readable HDF5 file ({error})") from error
-    yield "holds:"
+    yield "contents:"
     yield from found
     configuration = attributes.pop("configuration", None)
     if configuration is not None:
@@ -158,7 +159,7 @@ COMMAND = Command(
     "Describe a result file (content, units, provenance), or explain a word of scene files",
     "pdrom show results/fom/spring_oop/train.h5",
     {
-        "file": text("FILE", "result file, or a word such as spring or scene"),
+        "file": text("FILE", "result file, scene file, or a word such as spring or scene"),
         "--configuration": flag("print the whole configuration, as YAML"),
     },
     perform,

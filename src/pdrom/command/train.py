@@ -36,7 +36,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     paid = f"as long as the model saves in {1e3 * seconds / saved:.0f} frames"
     sys.stdout.write(
         f"{out}: {model.title}; training took {seconds:.3g} s, "
-        f"{paid if saved > 0.0 else 'but the full-order model is at least as fast'}"
+        f"{paid if saved > 0.0 else 'but the model is not faster than the full-order model'}"
         f"{' (times are unreliable: other programs ran)' * bool(model.validation.busy.any())}\n"
     )
     return Status.DONE
@@ -47,18 +47,18 @@ COMMAND = Command(
     "pdrom train bar.yaml --modes 40 --variations 3 --validate 2",
     {
         "scene": SCENE,
-        "runs": text("RUN.h5", "full-order runs, first of SCENE (default: run SCENE)", nargs="*"),
+        "runs": text("RUN.h5", "full-order runs, first of SCENE (default: a new run)", nargs="*"),
         "--modes": number(40, "number of POD modes of the displacements"),
         "--tolerance": number(0.01, "relative tolerance of the element sampling"),
         "--skinning": number(0, "number of skinning columns added to the modes"),
-        "--hold": text("SIDE", "also let later scenes fix these sides", nargs="+", default=()),
-        "--variations": number(0, "number of random variations to train on"),
-        "--validate": number(0, "number of other random variations to validate on"),
-        "--error": number(None, "choose the fewest of 20, 40, 80 modes with at most this error"),
-        "--unconverged": flag("use the scene's iterations instead of converged training frames"),
-        "--method": text("M", "reduce projections instead, by a method of config/methods.yaml"),
+        "--hold": text("SIDE", "sides that later scenes may fix, too", nargs="+", default=()),
+        "--variations": number(0, "number of random variations of the scene to train on"),
+        "--validate": number(0, "number of other random variations for validation"),
+        "--error": number(None, "use the fewest of 20, 40, 80 modes that reach this error"),
+        "--unconverged": flag("do not solve the training frames to convergence"),
+        "--method": text("M", "reduce projections instead of positions, by this method"),
         "--group": text("G", "group whose projections are reduced (required if several exist)"),
-        "--r": number(20, "number of modes of the projections"),
+        "--r": number(20, "number of modes with --method or --group"),
         "--out": text("FILE", "HDF5 file to write (default: SCENE.model.h5)"),
         "--unchecked": UNCHECKED,
     },

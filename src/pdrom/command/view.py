@@ -25,12 +25,12 @@ def perform(arguments: argparse.Namespace) -> Status:
     for path in written:
         require_output(path, [*arguments.runs, str(out)])
     if arguments.live and (written or len(arguments.runs) > 2):
-        raise ConfigurationError("--live: give a model and at most one run, no --png or --vtk")
+        raise ConfigurationError("--live: only a model and one run, without --png and --vtk")
     model = load_model(first) if arguments.live else None
     runs = [load(file, arguments.unchecked) for file in arguments.runs[bool(model) :]]
     scenes = [] if model else viewed_scenes(*runs)
     if len(scenes) > 1 and written:
-        raise ConfigurationError("--png and --vtk: give runs of one scene only")
+        raise ConfigurationError("--png and --vtk: only for runs of one scene")
     if model:
         model.view(out, *runs)
     else:
@@ -52,8 +52,8 @@ COMMAND = Command(
     "Show runs, or a model that runs in the browser, as a page, a picture or files for ParaView",
     "pdrom view pulled_sheet.h5 pulled.h5 --open",
     {
-        "runs": text("RESULT", "files from pdrom run", nargs="+"),
-        "--live": flag("run a model in the page: give its file, then a run to show as wires"),
+        "runs": text("RESULT", "runs (with --live: a model and at most one run)", nargs="+"),
+        "--live": flag("let the page run the model, with the run as wires"),
         "--out": text("FILE", "page to write (default: the first RESULT, as .html)"),
         "--open": flag("open the page in the browser"),
         "--png": text("FILE", "also draw four frames of each run"),

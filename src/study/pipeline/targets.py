@@ -28,7 +28,8 @@ def figure_file(word: str) -> str:
     known |= {f"{PREPRINT}{f.number}": name for name, f in figures.items() if f.number}
     known |= {name: name for name in figures}
     if word not in known:
-        raise ConfigurationError(f"figure '{word}': unknown{choices(word, known)}")
+        fault = "no figure has this number or name"
+        raise ConfigurationError(f"figure '{word}': {fault}{choices(word, known)}")
     return paths.FIGURE.at(paths.RESULTS, name=known[word])
 
 
@@ -52,7 +53,5 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Iterable[Any]) -> N
     for target in targets:
         if not any(target == rule.name or rule.is_producer(target) for rule in rules):
             known = [*plan.own_files, *plan.figures, *plan.tables, *(rule.name for rule in rules)]
-            raise ConfigurationError(
-                f"target '{target}': this study does not make it{suggestion(target, known)}; "
-                "a target is a file, or the name of a figure or table"
-            )
+            fault = "no file, figure or table of this study has this name"
+            raise ConfigurationError(f"target '{target}': {fault}{suggestion(target, known)}")

@@ -3,10 +3,9 @@
 import json
 import sys
 from collections.abc import Sequence
-from difflib import get_close_matches
 from pathlib import Path
 
-from pdrom.core.errors import ConfigurationError, choices
+from pdrom.core.errors import ConfigurationError, suggestion
 from pdrom.core.store import read_table, read_text
 from study.artifact.paths import PAPER_INPUT, TABLE
 from study.paper.build import NUMBERS
@@ -23,8 +22,7 @@ def number(arguments: Sequence[str]) -> None:
     subject = Subject.of(chosen.configfile, chosen.config)
     found = json.loads(read_text(Path(PAPER_INPUT.at(subject.results, name=NUMBERS))))["numbers"]
     if chosen.name not in found:
-        near = choices(chosen.name, get_close_matches(chosen.name, found))
-        fault = f"number '{chosen.name}': unknown{near}"
+        fault = f"the manuscript has no number '{chosen.name}'{suggestion(chosen.name, found)}"
         raise ConfigurationError(fault)
     made, entry = found[chosen.name], entries(Path("paper"))[chosen.name]
     say(f"{chosen.name}: {made['text']} (unrounded: {made['value']})")

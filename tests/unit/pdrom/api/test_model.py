@@ -105,7 +105,7 @@ def test_the_smallest_model_within_an_error_is_returned_or_the_most_accurate_is_
     assert found.reduced.columns.modes == 20
     with pytest.raises(NotReducibleError, match=r"error = 1e-06; the best has \d0 modes"):
         api.train(full, validate=1, error=1e-6, converged=False)
-    with pytest.raises(ConfigurationError, match="a validation trajectory is required"):
+    with pytest.raises(ConfigurationError, match="error requires validate"):
         api.train(full, error=0.1)
 
 
@@ -127,7 +127,7 @@ def test_an_argument_that_another_argument_overrides_is_refused(full, model):
         ("selection: ", [full], {"tolerance": None, "selection": len}),
         ("selection = 3: ", [full], {"selection": 3}),
         ("validate = True: ", [full], {"validate": True}),
-        ("a complete full-order run is required", [reduced], {}),
+        ("training needs complete full-order runs", [reduced], {}),
         ("blew up in frame 3", [full, blown], {}),
     ):
         with pytest.raises(ConfigurationError, match=words):
@@ -255,9 +255,9 @@ def test_a_model_file_of_another_format_or_without_a_model_is_refused(model, tmp
     with pytest.raises(StorageError, match="format 99 "):
         api.load_model(tmp_path / "newer.h5")
     api.save(model.run(model.scene), tmp_path / "run.h5")
-    with pytest.raises(StorageError, match="holds no model"):
+    with pytest.raises(StorageError, match="contains no model"):
         api.load_model(tmp_path / "run.h5")
-    with pytest.raises(StorageError, match="holds no complete run"):
+    with pytest.raises(StorageError, match="contains no complete run"):
         api.load(path)
 
 

@@ -152,7 +152,7 @@ def test_a_run_without_a_checksum_is_read_only_with_the_option_for_it(folder, fi
     with h5py.File("small.h5", "r+") as file:
         del file["timings"]
     told = refusal(capsys, [*TRAIN, "small.h5", "--unchecked"])
-    assert told.startswith("pdrom: small.h5: holds no complete run")
+    assert told.startswith("pdrom: small.h5: contains no complete run")
 
 
 def test_a_table_is_shown_with_the_meaning_of_its_columns(folder, capsys):
@@ -312,16 +312,16 @@ FAULTY = [
     (["show", "."], "is a folder"),
     (["run", "folder.h5"], "folder.h5: a result, not a scene; see `pdrom show folder.h5`"),
     (["run", "."], ".: a folder, name a file in it"),
-    ([*TRAIN, "--out", "small.yaml"], "this command reads the file"),
+    ([*TRAIN, "--out", "small.yaml"], "the output would replace a file"),
     (["run", "small.yaml", "--compare", "small.h5"], "--compare: only for reduced runs"),
     (["train", "small.yaml", "--modes", "4", "--r", "3"], "r: no effect without group or method"),
     (["run", "small.yaml", "--model", "none.h5"], "none.h5: no such file"),
     (["run", "small.yaml", "--frame", "3"], "--frame: only with --from"),
     (["run", "small.yaml", "--from", "x.h5", "--model", "x.h5"], "only for full-order runs"),
-    (["run", "small.yaml", "--from", "small.h5"], "this command reads the file"),
+    (["run", "small.yaml", "--from", "small.h5"], "the output would replace a file"),
     (["run", "small.yaml", "--model", "none.h5", "--check"], "--check: only for full-order runs"),
     (["run", "small.yaml", "--out", "."], ".: cannot be written (a folder)"),
-    (["view", "x.h5", "--png", "x.h5"], "this command reads the file"),
+    (["view", "x.h5", "--png", "x.h5"], "the output would replace a file"),
 ]
 
 
@@ -331,7 +331,7 @@ def test_foreign_files_and_the_mesh_of_the_scene_are_not_overwritten(folder, cap
     assert run(["new", "own.yaml", "--mesh", "m.obj"]) == Status.DONE
     for scene, out, words in (
         ("small.yaml", "mine.h5", "cannot be written (a file that pdrom has not made"),
-        ("own.yaml", "m.obj", "this command reads the file; name another output"),
+        ("own.yaml", "m.obj", "the output would replace a file that is read"),
     ):
         before = Path(out).read_bytes()
         for command in (["run", scene], ["train", scene, "none.h5"]):

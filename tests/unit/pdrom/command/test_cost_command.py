@@ -42,7 +42,7 @@ def test_the_cost_table_of_mesh_and_model_files_is_printed_and_drawn(folder, cap
         ("--model none.h5", "none.h5: no such file"),
         ("--plot cost", "--plot cost: only PNG is written; end the name in .png"),
         ("--plot taken.png", "taken.png: cannot be written"),
-        ("--coarser taken.png --plot taken.png", "taken.png: this command reads"),
+        ("--coarser taken.png --plot taken.png", "taken.png: the output would replace a file"),
     ],
 )
 def test_wrong_files_are_refused_before_anything_runs(folder, capsys, options, fault):

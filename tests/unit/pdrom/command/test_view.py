@@ -101,7 +101,7 @@ AT = "snapshots/spring/frames"
         ("small", first_of("positions", np.nan), r"positions: entry \(0, 0, 0\) is nan"),
         ("small", shortened("timings"), "11 of 12 frames"),
         ("small", first_of("snapshots/spring/p", np.nan), "snapshots of spring: entry"),
-        ("small", lambda file: file.attrs.modify("configuration", "{"), "holds no valid run"),
+        ("small", lambda file: file.attrs.modify("configuration", "{"), "contains no valid run"),
         ("small", lambda file: file["mesh"].pop("points"), "points"),
         ("small_small", first_of("mesh/triangles", 999), "triangle 0 has the corners"),
         ("small", first_of("positions", 5.0), "frame 0 differ"),

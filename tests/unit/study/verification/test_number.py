@@ -36,5 +36,5 @@ def test_the_command_shows_the_rows_of_a_number(last_run, capsys):
 
 
 def test_an_unknown_number_is_named(last_run):
-    with pytest.raises(PdromError, match=r"'wrst': unknown.*'worst'"):
+    with pytest.raises(PdromError, match=r"no number 'wrst'.*'worst'"):
         number(["--configfile", "config/own.yaml", "--", "wrst"])
