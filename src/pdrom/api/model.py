@@ -285,7 +285,7 @@ class Loop:
             found = [b for b in active if np.array_equal(b.vertices, self._selected[key])]
         if len(found) != 1:
             known = (f"{b.boundary.name} of {b.boundary.side or len(b.vertices)}" for b in active)
-            fault = f"names {len(found)} holds of frame {self.frame}, not 1 of: {', '.join(known)}"
+            fault = f"fits {len(found)} holds of frame {self.frame}, not 1 of: {', '.join(known)}"
             raise ConfigurationError(f"move: {shown(hold, 60)}: {fault}")
         found[0].shift = found[0].shift + shift
 
@@ -307,7 +307,7 @@ def require_same_mesh(own: Scene, other: Scene) -> None:
         faults.append(f"groups {', '.join(found)}; the training has {', '.join(wanted)}")
     for name in ("points", "triangles", "tetrahedra"):
         if not np.array_equal(getattr(own.mesh, name), getattr(other.mesh, name)):
-            faults += [f"another mesh than that of the training ({own.mesh.vertices} vertices)"]
+            faults += [f"its mesh is not that of the training ({own.mesh.vertices} vertices)"]
     if faults:
         raise ConfigurationError(f"scene '{other.config.name}': {faults[-1]}")
 
@@ -367,7 +367,7 @@ def load_model(path: str | os.PathLike[str]) -> Model:
         if "model" not in file or "format" not in file.attrs:
             raise StorageError(f"{path}: contains no model; pdrom show lists its contents")
         if (version := int(file.attrs["format"])) > FORMAT:
-            raise StorageError(f"{path}: format {version} needs a newer pdrom (known: {FORMAT})")
+            raise StorageError(f"{path}: format {version} requires a newer pdrom (this: {FORMAT})")
         return _model(file, json.loads(file.attrs["configuration"])["scene"], str(path))
 
 

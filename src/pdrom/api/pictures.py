@@ -90,7 +90,7 @@ def view(path: str | os.PathLike[str], *runs: Run) -> None:
         write_page(scenes, path)
         return
     if len(scenes) > 1:
-        raise SceneError(f"{path}: a picture shows 1 scene, given: {len(scenes)}")
+        raise SceneError(f"{path}: a picture shows one scene; the runs are of {len(scenes)}")
     write_frames(scenes[0], path)
 
 

@@ -185,7 +185,7 @@ class Run:
             ("number of frames", own.config.frames == other.config.frames),
         ):
             if not same:
-                fault = f"another {name} than {reference.title}: errors compare runs frame by frame"
+                fault = f"compared runs need the same {name}, unlike {reference.title}"
                 raise ConfigurationError(f"{self.title}: {fault}")
 
 

@@ -115,13 +115,13 @@ def _begun(
     for key in ("points", "triangles", "tetrahedra", "time_step"):
         had, has = (getattr(s.config if key == "time_step" else s.mesh, key) for s in (own, scene))
         if not np.array_equal(had, has):
-            sizes = f"{key} ({np.shape(had) or had} for {np.shape(has) or has})"
-            raise ConfigurationError(f"start: {start.title} has other {sizes} than the scene")
+            sizes = f"{key} ({np.shape(has) or has}) than the run ({np.shape(had) or had})"
+            raise ConfigurationError(f"start: the scene has other {sizes} that it continues")
     n, frames = len(start.ms) if frame is None else frame, scene.config.frames
     last = min(len(start.ms), frames - 1)
     if not isinstance(n, (int, np.integer)) or not 1 <= n <= last:
-        ends = f"the run has {len(start.ms)} frames, and the scene ends after frames = {frames}"
-        allowed = f"allowed are 1 to {last} (--frame), as {ends}" if last else f"{ends}: raise it"
+        ends = f"the run has {len(start.ms)} frames, and the scene has frames = {frames}"
+        allowed = f"allowed are 1 to {last}; {ends}" if last else f"{ends}: increase frames"
         raise ConfigurationError(f"frame = {shown(n, 60)}: {allowed}")
     q, anchors = start.positions[: n + 1].astype(float), Anchors()
     for k in range(n):
@@ -132,12 +132,12 @@ def _begun(
     for each, hold in zip(has, scene.boundaries, strict=True):
         kept.append(anchors[had.index(each)] if hold.moves and each in had else None)
         if hold.moves and kept[-1] is None and hold.active(n) and not hold.takes_hold(n):
-            fault = f"effect '{hold.name}' begins before frame {n}, but start lacks it"
+            fault = f"effect '{hold.name}' begins before frame {n}, but the run lacks it"
             raise ConfigurationError(f"{fault}: its vertices would jump; set start: {n}")
     for first in scene.starts:
         if first.config not in [each.config for each in own.starts]:
-            fault = f"effect '{first.name}' acts at frame 0 only, but start lacks it"
-            raise ConfigurationError(f"{fault}: remove it from a scene that continues start")
+            fault = f"effect '{first.name}' acts at frame 0 only, but the run lacks it"
+            raise ConfigurationError(f"{fault}: remove it from the scene that continues the run")
     anchors, unknown, part = tuple(kept), np.full(1, np.nan), 1e-3 / len(PHASES)  # of each phase
     begun = [
         (State(after, (after - before) / h, anchors), FrameReport(unknown, np.full(4, part * ms)))

@@ -175,7 +175,7 @@ def train(
             return model
         reached = f"{position:.2g} (positions) and {deformation:.2g} (deformation; inf: blew up)"
         tried.append((worst, f"{size} modes, with errors {reached}"))
-    fault = f"no model is within error = {asked.error:g}; the best has {min(tried)[1]}"
+    fault = f"every model exceeds error = {asked.error:g}; the best has {min(tried)[1]}"
     raise NotReducibleError(f"scene '{full.scene.config.name}': {fault}")
 
 

@@ -39,7 +39,7 @@ def perform(arguments: argparse.Namespace) -> Status:
     model = load_model(part) if part else None
     reference = load(arguments.compare, arguments.unchecked) if arguments.compare else None
     if reference and not (reference.full_order and reference.scene.config == scene.config):
-        fault = f"{reference.title} is not a full-order run of {file}"
+        fault = f"not a full-order run with the present keys of {file}; run it again"
         raise ConfigurationError(f"--compare {arguments.compare}: {fault}")
     tick = Progress(scene.config.name, scene.config.frames)
     start = load(arguments.start, arguments.unchecked) if arguments.start else None

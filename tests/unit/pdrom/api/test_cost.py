@@ -57,7 +57,7 @@ def test_a_cost_table_lists_settings_of_all_grids_and_of_a_model_the_fastest_fir
     assert len(figure.axes[0].texts) == len(table)
     assert {"model 1", "16 vertices"} <= {text.get_text() for text in figure.legends[0].texts}
     model.save(tmp_path / "own.h5")
-    with pytest.raises(ConfigurationError, match=f"^{tmp_path}/own.h5: scene 'test': another mesh"):
+    with pytest.raises(ConfigurationError, match=f"^{tmp_path}/own.h5: scene 'test': its mesh"):
         api.cost(sheet(size=7), models=[tmp_path / "own.h5"])
 
 

@@ -204,22 +204,22 @@ def test_only_fixed_vertices_of_the_training_or_declared_ones_are_accepted(full,
 
 def test_another_mesh_and_other_groups_are_refused(full, model):
     faulty = {
-        "another mesh than that of the training": scene(mesh=MESH | {"rows": 7}),
+        "its mesh is not that of the training": scene(mesh=MESH | {"rows": 7}),
         "groups spring, strain; the training has spring": scene(LEFT, SPRING, STRAIN),
         "needs all vertices": scene(LEFT, SPRING, {"effect": "self_collision", "thickness": 0.01}),
     }  # fmt: skip
     for words, other in faulty.items():
         with pytest.raises(PdromError, match=words):
             model.run(other)
-    with pytest.raises(ConfigurationError, match="another mesh"):
-        api.train(full, api.run(faulty["another mesh than that of the training"]))
+    with pytest.raises(ConfigurationError, match="its mesh is not"):
+        api.train(full, api.run(faulty["its mesh is not that of the training"]))
 
 
 def test_a_run_is_compared_only_with_runs_of_the_same_mesh_and_times(full, model):
     for words, other in {
-        "another mesh": scene(mesh=MESH | {"rows": 7}),
-        "another time step": scene(time_step=0.01),
-        "another number of frames": scene(frames=5),
+        "the same mesh": scene(mesh=MESH | {"rows": 7}),
+        "the same time step": scene(time_step=0.01),
+        "the same number of frames": scene(frames=5),
     }.items():
         with pytest.raises(ConfigurationError, match=words):
             full.error(api.run(other))

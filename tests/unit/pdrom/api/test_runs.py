@@ -52,7 +52,7 @@ def test_a_run_of_another_scene_continues_a_run_and_records_it(tmp_path):
     again = api.run(own, tmp_path / "a.h5", start=found, frame=9)  # pins do not return to rest
     assert np.array_equal(again.positions, found.positions)
     assert api.load(tmp_path / "a.h5").title.endswith(f"by continuing {found.title}, frame 9")
-    with pytest.raises(ConfigurationError, match="a complete full-order run is required"):
+    with pytest.raises(ConfigurationError, match="training needs complete full-order runs"):
         api.train(found)
 
 
@@ -62,7 +62,7 @@ def test_a_run_is_continued_only_on_the_same_mesh_and_from_one_of_its_frames():
     for words, keys, frame in (
         ("other points", {"mesh": (points + 1e-9, triangles)}, 3),
         ("other triangles", {"mesh": (points, triangles[:, [1, 2, 0]])}, 3),
-        (r"other time_step \(0.016 for 0.01\)", {"time_step": 0.01}, 3),
+        (r"other time_step \(0.01\) than the run \(0.016\)", {"time_step": 0.01}, 3),
         ("frame = 17: allowed are 1 to 16", longer, 17),
         ("frame = 0: allowed are 1 to 16", longer, 0),
         ("frame = 16: allowed are 1 to 15", {}, None),
