@@ -53,5 +53,6 @@ def check_targets(plan: Plan, targets: Iterable[str], rules: Iterable[Any]) -> N
     for target in targets:
         if not any(target == rule.name or rule.is_producer(target) for rule in rules):
             known = [*plan.own_files, *plan.figures, *plan.tables, *(rule.name for rule in rules)]
-            fault = "no file, figure or table of this study has this name"
-            raise ConfigurationError(f"target '{target}': {fault}{suggestion(target, known)}")
+            fault = f"target '{target}': no file, figure or table of this study has this name"
+            near = suggestion(target, known) or " (./reproduce --help explains targets)"
+            raise ConfigurationError(f"{fault}{near}")

@@ -22,8 +22,8 @@ def number(arguments: Sequence[str]) -> None:
     subject = Subject.of(chosen.configfile, chosen.config)
     found = json.loads(read_text(Path(PAPER_INPUT.at(subject.results, name=NUMBERS))))["numbers"]
     if chosen.name not in found:
-        fault = f"the manuscript has no number '{chosen.name}'{suggestion(chosen.name, found)}"
-        raise ConfigurationError(fault)
+        near = suggestion(chosen.name, found) or "; paper/numbers.yaml lists the numbers"
+        raise ConfigurationError(f"the manuscript has no number '{chosen.name}'{near}")
     made, entry = found[chosen.name], entries(Path("paper"))[chosen.name]
     say(f"{chosen.name}: {made['text']} (unrounded: {made['value']})")
     taken = f", {made['take']} of {len(made['rows'])} rows" if made["take"] else ""
