@@ -108,7 +108,7 @@ STEPS = {
     "+ shared coefficients": "one system for all coordinates",
     "+ whole elements": "element-wise sampling",
     "+ three elements a mode (sound)": "three elements per mode",
-    "and a gain of at most 2": "DEIM constant of at most 2",
+    "and a gain of at most 2": "elements until constant at most 2",
 }
 THICK = 2  # number of scenes with thick lines and printed DEIM constants
 
@@ -119,13 +119,13 @@ THICK = 2  # number of scenes with thick lines and printed DEIM constants
     f"bend_curved {MESHES}",
 )  # fmt: skip
 def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """One system for all coordinates and three elements per mode reduce the error most. Each line
-    is a scene: position errors of reduced simulations of the training trajectory, relative to the
-    full-order simulation, up to the predictability horizon. The first row is the preprint's code;
-    each further row makes one change and keeps all earlier changes. Simulations that blew up are
-    drawn on the right limit. Thin horizontal lines: ranges over simulations with randomly drawn
-    training frames. Numbers on the right: DEIM constants (bounds on the amplification of errors by
-    interpolation) of the scenes with thick lines.
+    """In most scenes, one system for all coordinates or three elements per mode reduces the error
+    most. Each line is a scene: position errors of reduced simulations of the training trajectory,
+    relative to the full-order simulation, up to the predictability horizon. The first row is the
+    preprint's code; each further row makes one change and keeps all earlier changes. Thin
+    horizontal lines: ranges over simulations with randomly drawn training frames. Numbers on the
+    right: DEIM constants (bounds on the amplification of errors by interpolation) of the scenes
+    with thick lines. Scenes marked (short) end before rounding errors dominate.
     """
     table = held(table[table.scene.isin(drawn.scenes) & table.gain.notna()])
     table = held(table[table.direction.isin(["up", "down"])])
@@ -257,9 +257,10 @@ def _draw_values(ax: Axes, rows: pd.DataFrame, colour: str, marker: str) -> None
 def reconstruction_error(drawn: Drawn, table: pd.DataFrame, published: Path) -> Figure:
     """On training frames, methods with one system for all coordinates (entry-wise and element-wise
     DEIM) are nearly as accurate as the orthogonal projection. The preprint's selection and code are
-    less accurate. Lines: relative error of projections reconstructed from samples with $r$ basis
-    vectors, on training frames, on frames between them, and on the first test trajectory. Grey:
-    output of the preprint's code for a similar scene. Arrow heads: errors above the axis.
+    less accurate. Lines: relative error if the projections of all elements are reconstructed from
+    samples with $r$ basis vectors. Solid: training frames; dashed: frames between them; dotted:
+    first test trajectory. Light grey lines without marks: errors that the preprint's code printed
+    for a similar scene. Arrow heads at the upper edge: larger errors.
     """
     styles = drawn.styles(table)
     figure, panels = _panels(drawn, table, SHOWN, 3, legend=3)

@@ -134,7 +134,7 @@ def iterations(
     methods="deim qdeim block-deim",
 )  # fmt: skip
 def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
-    """Entry-wise DEIM selects its entries in almost as many elements. It therefore computes many
+    """The $r$ entries that entry-wise DEIM selects lie in almost $r$ elements. It therefore computes
     more entries than it uses, since a projection yields all entries of its element. Left: sampled
     elements, coloured by the coordinate of the selected entry. Middle: number of sampled elements,
     by how many of their entries are used. Right: number of entries that are computed for a basis of
@@ -168,7 +168,7 @@ def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
         for axis, colour in AXES.items()
     ]
     handles += drawn.handles(drawn.looks)
-    handles.append(style.handle("entries that DEIM uses (r)", color=style.GREY, linestyle="--"))
+    handles.append(style.handle("entries that entry-wise DEIM uses (r)", color=style.GREY, linestyle="--"))
     style.legend(figure, handles, 4)
     return figure
 
