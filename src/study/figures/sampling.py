@@ -134,8 +134,8 @@ def iterations(
     methods="deim qdeim block-deim",
 )  # fmt: skip
 def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
-    """The $r$ entries that entry-wise DEIM selects lie in almost $r$ elements. It therefore computes
-    more entries than it uses, since a projection yields all entries of its element. Left: sampled
+    """The $r$ entries that entry-wise DEIM selects lie in nearly $r$ elements. More entries are
+    computed than used, since a projection yields all entries of its element. Left: sampled
     elements, coloured by the coordinate of the selected entry. Middle: number of sampled elements,
     by how many of their entries are used. Right: number of entries that are computed for a basis of
     size $r$.
@@ -168,7 +168,7 @@ def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
         for axis, colour in AXES.items()
     ]
     handles += drawn.handles(drawn.looks)
-    handles.append(style.handle("entries that entry-wise DEIM uses (r)", color=style.GREY, linestyle="--"))
+    handles.append(style.handle("used by entry-wise DEIM (r)", color=style.GREY, linestyle="--"))
     style.legend(figure, handles, 4)
     return figure
 
