@@ -15,6 +15,7 @@ from pdrom.reduction.method import MethodSpec
 from places import CONFIG, ROOT, tracked
 from study.artifact.paths import RESULTS
 from study.figures.runs import TOLERANCE
+from study.paper.numbers import entries, number_of
 from study.pipeline.study import StudySettings
 from study.verification.compare import folder_of, read_references
 from vocabulary import gone, known
@@ -22,6 +23,14 @@ from vocabulary import gone, known
 PAGES = sorted([ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").rglob("*.md")])
 SHOWN = {"published": ("r", 20), "gappy": ("r", 20), TOLERANCE: ("k", 10)}  # in docs/teaser.png
 ADDING = ROOT / "docs" / "adding.md"
+# Untimed sentences of the README's answer, with the names of numbers in paper/numbers.yaml.
+ANSWER = (
+    "{claimsHold} hold, {claimsMixed} hold in some cases only",
+    "Of {threeForOneFailing} simulations with a position error above 10 %, {threeForOneRescued}",
+    "below 10 % in {improvedAccurate} of {improvedOf} cases on the training trajectory",
+    "below 10 % in {improvedTest} of the {improvedOf} cases",
+    "its error is {barErrorLeast} to {barErrorMost} % on three test trajectories",
+)
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
 NAMED = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
@@ -136,3 +145,13 @@ def test_the_numbers_of_the_readme_s_picture_are_those_of_the_expected_tables() 
     ]
     caption = (ROOT / "README.md").read_text("utf-8").split("docs/teaser.png)")[1].split("*\n")[0]
     assert re.findall(r"([\d.]+) %", caption) == [f"{float(f'{e:.2g}'):g}" for e in errors]
+
+
+def test_the_numbers_of_the_readme_s_answer_are_those_of_the_paper() -> None:
+    text = (ROOT / "README.md").read_text("utf-8").split("## The answer")[1].split("\n## ")[0]
+    tables = read_references(ROOT / folder_of(RESULTS))
+    frames, known = {name: found.frame for name, found in tables.items()}, entries(ROOT / "paper")
+    for sentence in ANSWER:
+        names = re.findall(r"\w+(?=\})", sentence)
+        shown = {name: number_of(name, known, frames).text for name in names}
+        assert sentence.format(**shown) in text
