@@ -48,7 +48,7 @@ RUNS: dict[str, Read] = {
 COMPARED = """separate systems for x, y, z (preprint's selection) distort most simulations or make
 them blow up. Element-wise DEIM is closer to the full-order model. Pictures show one frame of the
 training trajectory: the full-order model, then simulations with reduced projections by basis size
-$r$. Grey outline: full-order model. Red frame: the smaller scale is given below the picture.
+$r$. Grey outline: full-order model. Red frame: picture at the smaller scale that is given below it.
 """
 
 
@@ -245,7 +245,7 @@ def cloth_all_grid(drawn: Drawn, horizon: Horizon, **files: Files) -> Figure:
     force. Pictures show a cloth with bending, springs and strain in frames up to its predictability
     horizon: the full-order model, then simulations in which two methods reduce the projections of
     one constraint group. Colours show the distance to the full-order model, whose outline is grey.
-    Red frame: the smaller scale is given below.
+    Red frame: picture at the smaller scale given below it.
     """
     # instants as fractions of the horizon
     runs = Runs(drawn, horizon, (20, 10, "full"), (0.5, 0.75, 1.0), **files)

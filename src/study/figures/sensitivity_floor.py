@@ -52,8 +52,8 @@ def sensitivity_floor(drawn: Drawn, sensitivity: list[File], horizon: Horizon) -
     """In some scenes a tiny change of the initial positions grows until two full-order simulations
     disagree. Lines: relative difference of two simulations whose initial positions differ by
     {sensitivity.reference} of the body size. The horizon of a scene (dot) is the first frame at
-    which the difference exceeds {sensitivity.threshold} (grey line). We evaluate no simulation
-    beyond the horizon (dotted). Scenes without a dot are predictable to their end.
+    which the difference exceeds {sensitivity.threshold} (grey line). No reduced simulation
+    is evaluated beyond the horizon (dotted). Scenes without a dot are predictable to their end.
     """
     floors = floors_of(sensitivity, horizon)
     scenes = [scene for scene in drawn.scenes if len(floors[scene][0])][:MOST]
