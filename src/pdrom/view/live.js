@@ -111,8 +111,8 @@
     const parts = [`${data.title}.`, model.family === "joint"
       ? `As in the preprint, ${model.r} modes of the projections are interpolated at ${run.elements} elements, with one shared row for x, y, z.`
       : model.family === "all" ? "All elements are evaluated."
-      : "A few elements, with weights, replace all of them (energy-conserving sampling and weighting, ECSW).", drawing.accelerated
-      ? "Drawn by WebGL2." : "This browser has no WebGL2: the picture is drawn on the processor, and slower."];
+      : "A few weighted elements replace all elements (energy-conserving sampling and weighting, ECSW).", drawing.accelerated
+      ? data.motion === null ? "" : "The distance is relative to the mean displacement of the full-order run." : "This browser has no WebGL2: the picture is drawn on the processor, and slower."];
     at("about").textContent = parts.join(" ");
     play(true);
     document.body.dataset.ready = "yes";
@@ -337,7 +337,7 @@
   }
 
   drawing = new Drawing(at("picture"), { grab, plain: location.hash === "#plain", ...scenes[0]?.view });
-  fill(at("scene"), scenes.map((_, i) => i), (i) => scenes[i].scene.replaceAll("_", " "));
+  fill(at("scene"), scenes.map((_, i) => i), (i) => scenes[i].words ?? scenes[i].scene.replaceAll("_", " "));
   at("choice").addEventListener("submit", (event) => event.preventDefault());
   at("scene").addEventListener("change", () => {
     unknown = "";

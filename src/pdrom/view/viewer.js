@@ -162,16 +162,16 @@
   // Largest and last error of a run.
   function told(run) {
     const known = run.error.flatMap((error, f) => (error === null ? [] : [[error, f + 1]]));
-    if (!known.length) return "no frame has a relative error";
+    if (!known.length) return "No frame has a relative error";
     const [largest, when] = known.reduce((a, b) => (b[0] > a[0] ? b : a)), [last, end] = known[known.length - 1];
-    return `largest ${largest.toPrecision(2)} (frame ${when}), last ${last.toPrecision(2)} (frame ${end})`;
+    return `Largest error ${largest.toPrecision(2)} (frame ${when}); last error ${last.toPrecision(2)} (frame ${end})`;
   }
 
   function tell() {
     const { scene, run } = shown, ms = (value) => (value === null ? "not timed" : `${value.toPrecision(3)} ms a frame`);
     const parts = [`${scene.title}.`, `${scene.method[0].toUpperCase()}${scene.method.slice(1)}: ${ms(scene.ms)}.`];
     if (run) parts.push(`Reduced: ${ms(run.ms)}.`);
-    if (run) parts.push(`Relative error: distance between the two runs, divided by the full-order displacement (root mean square over the frames); ${told(run)}.`);
+    if (run) parts.push(`Relative error: distance between the two runs, divided by the full-order displacement (root mean square over all frames). ${told(run)}.`);
     if (run && run.blowup !== null) parts.push(`The reduced run blew up at frame ${run.blowup}.`);
     if (!drawing.accelerated) parts.push("This browser has no WebGL2: pictures are drawn on the processor, and slower.");
     at("about").textContent = parts.join(" ");

@@ -88,7 +88,7 @@ async function showTable(name) {
     const about = column === null ? null : $("columns").querySelector(`tr[data-column="${CSS.escape(column)}"]`);
     const gone = [column, ...filters.map(([name]) => name)].filter((name) => name !== null && ![...head, "row"].includes(name));
     const [meaning, unit, kind, tolerance] = [...(about?.cells ?? [])].slice(1).map((cell) => cell.textContent);
-    $("column").textContent = about ? `${column}: ${meaning}${unit && `, ${unit}`}. Compared by verify as ${kind}; tolerance: ${tolerance}.`
+    $("column").textContent = about ? `${column}: ${meaning}${unit && `, ${unit}`}. Tolerance of ./reproduce verify: ${tolerance} (kind of column: ${kind}).`
       : gone.length ? `This table has no column ${gone.join(", ")}.` : "";
     show();
   };
@@ -101,7 +101,9 @@ async function showTable(name) {
       cell.scope = "col";
       cell.classList.toggle("asked", title === column);
       if (order?.column === place) cell.ariaSort = order.down ? "descending" : "ascending";
-      element("button", title, cell).onclick = () => {
+      const button = element("button", title, cell);
+      button.title = $("columns").querySelector(`tr[data-column="${CSS.escape(title)}"]`)?.cells[1].textContent ?? "";
+      button.onclick = () => {
         order = { column: place, down: order?.column === place && !order.down };
         choose();
         $("rows").querySelectorAll("button")[place].focus(); // the pressed button was replaced
@@ -110,7 +112,7 @@ async function showTable(name) {
     for (const i of chosen.slice(start, start + SHOWN)) {
       const made = element("tr", "", body);
       element("td", String(i + 1), made);
-      rows[i].forEach((cell, place) => { const one = element("td", cell, made); one.title = cell; one.classList.toggle("asked", head[place] === column); });
+      rows[i].forEach((cell, place) => { const one = element("td", cell, made); one.classList.toggle("long", cell.length > 40); one.classList.toggle("asked", head[place] === column); });
     }
     $("rows").replaceChildren(top, body);
     $("range").textContent = chosen.length ? `${start + 1} to ${Math.min(start + SHOWN, chosen.length)} of ${chosen.length}` : "no rows";

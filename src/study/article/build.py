@@ -35,8 +35,6 @@ from study.tables.kit.declaration import QUANTITIES, TOLERANCES
 
 # Bytes: larger pictures are compressed with losses; larger PDFs are not copied to the web pages.
 LOSSLESS, COPIED = 150_000, 200_000
-
-
 Drawn = Mapping[str, tuple[tuple[int, int], bool]]  # figure -> size in pixels, and has it a PDF?
 
 
@@ -51,9 +49,8 @@ def shown_figure(name: str, node: Node, drawn: Drawn, known: Collection[str]) ->
     # a single text node, because pandoc hides a caption that has the nodes of the alternative text
     alternative = words(plain(caption[1]).strip())
     image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
-    made = {"t": "RawInline", "c": ["html", _origin(name, with_pdf, known)]}
-    origin = [{"t": "Plain", "c": [*words("Command: "), made]}]
-    told = [caption[0], [*caption[1], boxed("Div", origin, "", "origin")]]
+    origin = {"t": "RawBlock", "c": ["html", _origin(name, with_pdf, known)]}
+    told = [caption[0], [*caption[1], boxed("Div", [origin], "", "origin")]]
     return {"t": "Figure", "c": [attribute, told, [{"t": "Plain", "c": [image]}]]}
 
 
@@ -64,7 +61,7 @@ def _origin(name: str, with_pdf: bool, known: Collection[str]) -> str:
     data = ", ".join(f'<a href="tables/{table}.html">{table}</a>' for table in tables)
     pdf = f'<a href="figures/{name}.pdf">PDF</a>. ' if with_pdf else ""
     return (
-        f"<code>./reproduce figure {name}</code>. "
+        f"Command: <code>./reproduce figure {name}</code>. "
         f"{f'Data: {data}.' if tables else 'Drawn from files of simulations.'} {pdf}"
         f'Last <code>./reproduce verify</code>: <span data-verified="figure {name}">not run</span>.'
     )
@@ -76,6 +73,8 @@ FACTS = {
     "scenes": "Scenes of the configuration",
     "machine": "Machine on which the study ran",
 }
+PARTS = {"published": "Preprint's method", "beyond": "Improved method"}
+VERIFIED, INDEX = "verified.js", "index.html"
 
 
 def table_page(name: str, csv: bytes, template: str) -> str:
@@ -84,16 +83,17 @@ def table_page(name: str, csv: bytes, template: str) -> str:
     columns = "".join(
         f"<tr data-column='{c.name}'><th scope=row>{c.name}</th>"
         f"<td>{marked(escape(c.meaning))}</td><td>{escape(c.unit)}</td>"
-        f"<td>{c.quantity}: {escape(QUANTITIES[c.quantity])}</td>"
+        f"<td>{c.quantity}</td>"
         f"<td>{f'{c.within:g}' if c.quantity in TOLERANCES else 'not compared'}</td></tr>"
         for c in (table.columns if table else ())
     )
-    none = "<tr><td colspan=5>facts about the configuration, not compared by verify</td></tr>"
+    kinds = {c.quantity: QUANTITIES[c.quantity] for c in (table.columns if table else ())}
     parts = {
         "NAME": name,
         "TITLE": escape(titles()[name]),
         "COMMAND": escape(f"./reproduce {argument(name)}"),
-        "COLUMNS": columns or none,
+        "COLUMNS": columns or "<tr><td colspan=5>facts that verify does not compare</td></tr>",
+        "KINDS": "".join(f"<p><strong>{k}</strong>: {escape(v)}.</p>" for k, v in kinds.items()),
         "DATA": base64.b64encode(gzip.compress(csv, 9, mtime=0)).decode(),
     }
     return filled(template, parts)
@@ -111,9 +111,6 @@ def argument(name: str) -> str:
     return TABLE.at(RESULTS, name=name) if name in declarations() else name
 
 
-PARTS = {"published": "Preprint's method", "beyond": "Improved method"}
-
-
 def claims_page(
     claims: Mapping[str, ClaimRule], tests: pd.DataFrame, verdicts: pd.DataFrame,
     pages: Mapping[str, str], template: str,
@@ -122,43 +119,38 @@ def claims_page(
 
     pages : name of a figure -> file name of the page that shows it
     """
-    found, body = verdicts.set_index("claim"), ""
+    body, section, end = template.split("<!-- each claim -->\n")
+    found = verdicts.set_index("claim").replace("depends", "mixed")
     for name, rule in claims.items():
-        mine, verdict, shown = tests[tests.claim == name], found.loc[name], rule.figure_or_table
-        place = f"{pages[shown]}#fig:{shown}" if shown in pages else f"tables/{shown}.html"
+        mine, shown = tests[tests.claim == name].replace("depends", "mixed"), rule.figure_or_table
         history = "".join(
             f"<li>{c.date} ({'results were known' if c.after_data else 'before any result'}): "
             f"{escape(c.reason)}</li>"
             for c in rule.changes
         )
-        body += (
-            f"<section aria-labelledby='{name}'><h2 id='{name}'>{name}: {escape(rule.paper)}</h2>"
-            f"<p>{escape(rule.text)} <small>{escape(rule.source)}, section {escape(rule.section)}, "
-            f"figures: {escape(rule.shown)}. Qualifiers: {escape(rule.qualifiers)}.</small></p>"
-            f"<p><strong>Preprint's method: {escape(verdict.verdict)}. "
-            f"Improved method: {escape(verdict.verdict_beyond)}.</strong> If the deformation error "
-            f"counts, too: {escape(verdict.verdict_both)}; improved method: "
-            f"{escape(verdict.verdict_beyond_both)}. Last "
-            f"<code>./reproduce verify</code>: <span data-verified='claim {name}'>not run</span>. "
-            f"Command: <code>./reproduce claims</code>. Shown in <a href='{place}'>{shown}</a>.</p>"
-            f"{''.join(_tests(name, part, getattr(rule, part), mine) for part in PARTS)}"
-            f"<h3>Changes of the rules</h3><ul>{history}</ul>"
-            f"<p><small>Rules: <code>config/claims.yaml</code>, "
-            f"fingerprint {rule.fingerprint}.</small></p></section>"
-        )
-    return filled(template, {"TITLE": "Claims", "BODY": body})
+        texts = rule.model_dump() | dict(found.loc[name])
+        parts = {key.upper(): escape(str(text)) for key, text in texts.items()} | {
+            "NAME": name, "SHOWN": shown, "HISTORY": history, "FINGERPRINT": rule.fingerprint,
+            "FIGURES": "" if rule.shown == "none" else f", figures: {escape(rule.shown)}",
+            "KIND": "figure" if shown in pages else "table",
+            "PLACE": f"{pages[shown]}#fig:{shown}" if shown in pages else f"tables/{shown}.html",
+            "TESTS": "".join(_tests(name, part, getattr(rule, part), mine) for part in PARTS),
+        }  # fmt: skip
+        body += filled(section, parts)
+    return body + end
 
 
 def _tests(name: str, part: str, rules: tuple[TestRule, ...], tests: pd.DataFrame) -> str:
-    rows = "<tr><th>test</th><th>rule</th><th>rows that satisfy the rule</th><th>result</th></tr>"
+    rows = "<tr><th>test</th><th>rule</th><th>agreeing rows</th><th>result, range, median</th></tr>"
     place = f"tables/claims_tests.html#claim={name}|part={part}|satisfied"
     for rule, row in zip(rules, tests[tests.part == part].itertuples(), strict=True):
         note = "" if rule.decides else " (does not decide the verdict)"
-        spread = f"{row.least:.2g} to {row.most:.2g}, median {row.median:.2g}: "
+        low, middle, high = (f"{float(f'{v:.2g}'):g}" for v in (row.least, row.median, row.most))
+        spread = f"; {low} to {high}, median {middle}".replace("inf", "\u221e")
         rows += (
             f"<tr><td>{escape(rule.what)}{note}</td><td>{_rule(rule)}</td>"
             f"<td><a class=val href='{place}'>{row.satisfied} of {row.of}</a></td>"
-            f"<td>{'' if pd.isna(row.least) else spread}{escape(row.verdict)}</td></tr>"
+            f"<td>{escape(row.verdict)}{'' if pd.isna(row.least) else spread}</td></tr>"
         )
     region = f"class=scroll tabindex=0 role=region aria-label='Tests of {name}, {part}'"
     return f"<h3>{PARTS[part]}</h3><div {region}><table>{rows}</table></div>"
@@ -169,16 +161,13 @@ def _rule(rule: TestRule) -> str:
     where = "; ".join(
         f"{column}: {', '.join(map(str, values))}" for column, values in rule.where.items()
     )
-    margin = f"; undecided within a factor {rule.factor:g} of this limit" if rule.timed else ""
+    margin = f"; undecided within a factor of {rule.factor:g} of the limit" if rule.timed else ""
     return (
-        f"<code>{rule.metric}</code> of <a href='tables/{table}.html'>{table}</a>"
+        f"<code>{rule.metric}</code> of table <a href='tables/{table}.html'>{table}</a>"
         f"{f' ({escape(where)})' if where else ''} "
-        f"{'at least' if rule.compare == '>=' else 'at most'} {rule.threshold:g}, "
-        f"in {rule.share:.0%} of the rows{margin}; <code>./reproduce {argument(table)}</code>"
+        f"is {'at least' if rule.compare == '>=' else 'at most'} {rule.threshold:g} "
+        f"in at least {100 * rule.share:g} % of the rows{margin}"
     )
-
-
-VERIFIED, INDEX = "verified.js", "index.html"
 
 
 def write_verified(found: Mapping[str, str], folder: Path) -> None:
@@ -192,7 +181,8 @@ def write_verified(found: Mapping[str, str], folder: Path) -> None:
 FOLDER = Path("src/study/article")
 ASSETS = {
     "text": "article.html",
-    "plain": "plain.html",
+    "list": "tables.html",
+    "page": "claims.html",
     "table": "table.html",
     "style": "article.css",
     "script": "article.js",
@@ -238,18 +228,20 @@ def write_article(
     }
     linked = {page: words for page, (words, rule) in LINKS.items() if rule in (*made, "")}
     written = {name: path.read_text("utf-8") for name, path in assets.items()}
-    plain = written.pop("plain").replace("{{LINKS}}", _links(linked))
+    claimed = written.pop("page").replace("{{LINKS}}", _links(linked))
     of_table = written.pop("table").replace("{{LINKS}}", _links(linked, "../"))
     rules = load_claims(claims, added)
     for name, content in csv.items():
         written[f"table_{name}"] = table_page(name, content, of_table)
     items = "".join(
-        f"<li><a href='tables/{name}.html'><code>{name}</code></a> {escape(titles()[name])}</li>"
+        f"<li><a href='tables/{name}.html'><code>{name}</code></a>: {escape(titles()[name])}</li>"
         for name in sorted(csv)
     )
-    written["tables"] = filled(plain, {"TITLE": "Tables", "BODY": f"<ul>{items}</ul>"})
+    written["tables"] = filled(written.pop("list"), {"LINKS": _links(linked), "BODY": items})
     if "claims" in outputs:
-        written["claims"] = claims_page(rules, known["claims_tests"], known["claims"], pages, plain)
+        written["claims"] = claims_page(
+            rules, known["claims_tests"], known["claims"], pages, claimed
+        )
     drawn = _write_figures(figures, pictures, outputs)
     files = {
         f"{name}.tex": linked_table(tex_rows(name, known), {table: known[table] for table in read})
@@ -264,11 +256,12 @@ def write_article(
         shown = partial(shown_figure, drawn=drawn, known=csv)
         trees[stem] = numbered(tree, counters, shown)
     del written["text"]
+    addresses = {claim: f"claims.html#{claim}" for claim in rules}
+    addresses |= {name: f"tables/{name}.html" for name in csv}
     for stem, tree in trees.items():
         others = {PAGES[other]: TITLES[other] for other in texts if other != stem}
-        variables = {"pages": _links(others | linked)}
-        variables |= {"part": escape(facts.part)} if facts.part else {}
-        written[stem] = page(resolved(tree, labels, rules), assets["text"], variables)
+        variables = {"pages": _links(others | linked), "part": escape(facts.part or "")}
+        written[stem] = page(resolved(tree, labels, addresses), assets["text"], variables)
     for name, text in written.items():
         write_text(text, outputs[name])
     write_verified({}, Path(outputs["main"]).parent)

@@ -31,12 +31,18 @@ _NUMBER = re.compile(
     r"(?:[^A-Za-z]|\\(?:ensuremath|cdot|infty|times|ge|le)(?![A-Za-z])|\b(?:to|of)\b)*\d"
     r"(?:[^A-Za-z]|\bloses\b)*"
 )
-_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?)$")  # number at the end of a cell: "holds (20/20)"
+_TAIL = re.compile(r"(\(|, )(\d[\d/, ]*)([)}]?(?:; \D*)?)$")  # last number: "holds (20/20); mixed"
+# Citations show authors and years on web pages, and numbers in the PDF; "%" must follow its number.
+_WEB = (
+    (r"\((\\method\{[^{}]*\}) (\\cite\{[^{}]*\})\)", r"(\1) \2"),
+    (r"\b(is|in|of|after)\s+\\cite\{", r"\1 \\citet{"),
+    (r"\\,\\%", "\u202f\\\\%"),
+)
 _FIGURE = r"\begin{figure}\includegraphics{%s.pdf}\caption{%s}\label{fig:%s}\end{figure}"
 # One-line definitions of TeX commands and theorems in the preamble, which pandoc can read.
 # Definitions of layout commands are left out: `REPLACED` defines simpler commands of these names.
 _SHORT = re.compile(
-    r"(?m)^\\(?:newcommand\{\\(?!longtableof|tablefile|pictureof|n|known|row)\w+\}.*\}|newtheorem.*)$"
+    r"(?m)^\\(?:newcommand\{\\(?!(?:longtableof|tablefile|pictureof|n|known)\})\w+\}.*\}|newtheorem.*)$"
 )
 REPLACED = r"""
 \newcommand{\longtableof}[4]{\begin{table}\caption{#3}\label{#2}\input{#4}\end{table}}
@@ -65,6 +71,8 @@ def prepared(source: str, document: str, origins: Mapping[str, Any], facts: Fact
         lambda found: _link(numbers[found[1]]["key"], numbers[found[1]]["text"]),
         _MATH.sub(_apart, text),
     )
+    for pattern, shown in _WEB:
+        text = re.sub(pattern, shown, text)
     text = _DROPPED.sub("", text.replace("{fittedtabular}", "{tabular}"))
     short = [found[0] for found in _SHORT.finditer(preamble)]
     return plain_columns("\n".join([*short, _title(preamble), REPLACED, begin, text]))
@@ -134,6 +142,7 @@ def _linked_cell(cell: str, key: str) -> str:
     """Return ``cell`` with a link from its number (whole cell or end) to the rows ``key``."""
     if _NUMBER.fullmatch(cell):
         return _link(key, cell)
+    cell = re.sub(r"^(\w+) (\d+)$", r"\1~\2", cell)  # "test 1" stays on one line
     return _TAIL.sub(lambda found: found[1] + _link(key, found[2]) + found[3], cell)
 
 

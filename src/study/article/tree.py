@@ -182,20 +182,22 @@ def _equation(node: Node, labels: Labels) -> Node:
     return boxed("Span", [math, numbers], "", "equation", tabindex="0")
 
 
-def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], claims: Mapping[str, Any]) -> Node:
-    """Turn references, table values and claim names into links; put paragraph headings in line.
+def resolved(tree: Node, labels: Mapping[str, tuple[str, str]], pages: Mapping[str, str]) -> Node:
+    """Turn references, values, names of claims and tables into links; put headings in line.
 
-    ``labels`` map TeX labels to (number, page). The keys of ``claims`` are the names of claims in
-    the text, such as "C4". Raises PaperError if the text refers to a label that does not exist.
+    ``labels``: TeX label -> (number, page); ``pages``: name of a claim or table -> address.
+    Raises PaperError if the text refers to a missing label.
     """
 
     def visit(node: Node) -> Any:
         kind, content = node["t"], node.get("c", [])
         if kind == "Link":
             return _resolved_link(node, labels)
-        if kind == "Str" and (found := _CLAIM.fullmatch(content)) and found[2] in claims:
-            here = link(words(found[2]), f"claims.html#{found[2]}", "claim")
+        if kind == "Str" and (found := _CLAIM.fullmatch(content)) and found[2] in pages:
+            here = link(words(found[2]), pages[found[2]], "claim")
             return [*words(found[1]), here, *words(found[3])]
+        if kind == "Code" and content[1] in pages:
+            return link([node], pages[content[1]])
         if kind == "Span" and (colour := _COLOUR.search(str(content[0][2]))):
             return boxed(kind, changed(content[1], visit), "", colour[1])
         return None

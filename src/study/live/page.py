@@ -8,12 +8,13 @@ from pdrom.view.page import LIVE, page_of
 from study.artifact.artifact import Artifact
 from study.artifact.paths import LIVE_MODEL, LIVE_PAGE, File
 from study.artifact.reads import Every, ProjectFile
+from study.artifact.words import scene
 
 
 def _write(models: list[File], outputs: Mapping[str, str], parts: list[Path]) -> None:
     """Write the page with a list of the scenes for which ``models`` has at least one model."""
     scenes = [
-        {"scene": file["scene"], "file": "/".join(Path(file.path).parts[-2:])}
+        {"scene": (name := file["scene"]), "words": scene(name), "file": f"live/{name}.js"}
         for file in models
         if '"models":[]' not in read_text(file.path)
     ]

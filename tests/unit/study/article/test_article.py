@@ -49,10 +49,11 @@ MAIN = r"""
 On \scene{bar\_a} it is \n{podError}\,\%, at most \n{worst} of
 $K = \n{scenes}$, named \n{basis}; equation
 \eqref{eq:one}, figure~\ref{fig:ladder}, table~\ref{tab:payoff}, theorem~\ref{thm:s},
-section~\ref{sec:more} \cite{Page63}. C1 holds.
+section~\ref{sec:more} \cite{Page63}, table \source{payoff}. C1 holds.
 \known{Shown, \n{podScenes}.} \known{Left out, \n{unknown}.}
 \paragraph{Opening.} Words.
-\begin{equation}\label{eq:one} a = b \end{equation}
+\begin{equation}\label{eq:one} a = \norm{b} \end{equation}
+A survey is \cite{Page63}; another (\method{pod} \cite{Page63}).
 \figureof{ladder}
 \longtableof{\small}{tab:payoff}{Caption.}{tab_frontier.tex}
 \end{document}
@@ -309,6 +310,7 @@ RUNS = frame("scene group error", ("a_b", "x_y", 0.0123), ("a_b", "z", 0.25), ("
         (r"\texttt{c} & full order & 0.50", "scene=c|error=0.50", "0.50"),
         (r"\texttt{d} & z & 2 of 3", "group=z", "2 of 3"),
         ("d & z & holds (2/3, 1/4)", "group=z", "2/3, 1/4"),
+        ("d & z & holds (2/3); both errors: mixed", "group=z", "2/3"),
         (r"d & z & \textcolor{okred}{blow-up, 34}", "group=z", "34"),
         (r"d & z & $\ge$ 0.70", "group=z", r"$\ge$ 0.70"),
         ("d & z & 3.4 (3.1 to 3.6) (loses)", "group=z", "3.4 (3.1 to 3.6) (loses)"),
@@ -397,6 +399,18 @@ def test_blocks_about_results_that_the_study_lacks_are_left_out(small):
     shown = {words: words in text for words in ("Shown, ", "Full.", "Left out", "lacking")}
     assert shown == {"Shown, ": True, "Full.": True, "Left out": False, "lacking": False}
     assert "(implementation: numpy, compiled)" in claims
+    found = [
+        words in claims for words in ("Improved method: mixed.", "at least 0.7 in at least 75 %")
+    ]
+    assert found == [True, True]
+
+
+def test_formulas_citations_and_names_of_tables_read_as_text(small):
+    page = (small / "index.html").read_text("utf-8")
+    text = re.sub(r"<annotation.*?</annotation>|<[^>]*>", "", page)
+    assert ["$" in text, "\u202f%" in text] == [False, True]
+    assert "A survey is Page (1963); another (pod) (Page 1963)." in text
+    assert '<a href="tables/payoff.html"><code>payoff</code></a>' in page
 
 
 def test_the_article_is_made_with_the_same_bytes_again(small, tmp_path):
@@ -409,7 +423,7 @@ def test_the_article_is_made_with_the_same_bytes_again(small, tmp_path):
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "light"), (1400, "dark")])
 def test_pages_open_without_a_message_and_axe_finds_no_error(small, width, scheme):
     for pages in study_or_small(small):
-        for name in ("index", "claims", "tables", "tables/payoff"):
+        for name in ("index", "supplement", "claims", "tables", "tables/payoff"):
             with page_at((pages / f"{name}.html").as_uri(), width, 900) as page:
                 page.emulate_media(color_scheme=scheme)
                 found = Axe().run(page, options={"preload": False}).response["violations"]

@@ -20,7 +20,8 @@ def test_scenes_with_models_are_named_in_order_and_a_damaged_file_is_refused(tmp
         write_text(f'pdromLive({{"format":1,"scene":"{file.stem}","more":0}});\n', file)
     write_text('pdromLive({"format":1,"scene":"without","models":[]});\n', without)
     text = write_page(tmp_path, [one, without, two]).read_text("utf-8")
-    assert '[{"scene":"one","file":"live/one.js"},{"scene":"two","file":"live/two.js"}]' in text
+    scene = '{{"scene":"{0}","words":"{0}","file":"live/{0}.js"}}'
+    assert f"[{scene.format('one')},{scene.format('two')}]" in text
     two.write_text("damaged", encoding="utf-8")
     with pytest.raises(StorageError, match=r"two\.js"):
         write_page(tmp_path, [one, two])
