@@ -43,15 +43,16 @@ def shown_figure(name: str, node: Node, drawn: Drawn, known: Collection[str]) ->
 
     ``node`` is the figure as pandoc parsed it, ``known`` has the names of all tables with a page.
     """
-    size, with_pdf = drawn[name]
-    attribute, caption, _ = node["c"]
-    picture = attributes("", "", width=str(size[0]), height=str(size[1]), loading="lazy")
+    (width, height), with_pdf = drawn[name]
+    (attribute, caption, _), picture = node["c"], f"figures/{name}.webp"
+    size = attributes("", "", width=str(width), height=str(height), loading="lazy")
     # a single text node, because pandoc hides a caption that has the nodes of the alternative text
     alternative = words(plain(caption[1]).strip())
-    image = {"t": "Image", "c": [picture, alternative, [f"figures/{name}.webp", ""]]}
+    image = {"t": "Image", "c": [size, alternative, [picture, ""]]}
     origin = {"t": "RawBlock", "c": ["html", _origin(name, with_pdf, known)]}
     told = [caption[0], [*caption[1], boxed("Div", [origin], "", "origin")]]
-    return {"t": "Figure", "c": [attribute, told, [{"t": "Plain", "c": [image]}]]}
+    opened = {"t": "Link", "c": [attributes(), [image], [picture, ""]]}
+    return {"t": "Figure", "c": [attribute, told, [{"t": "Plain", "c": [opened]}]]}
 
 
 def _origin(name: str, with_pdf: bool, known: Collection[str]) -> str:
