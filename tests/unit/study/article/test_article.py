@@ -128,10 +128,9 @@ def write_study(folder: Path) -> dict[str, object]:
     """A manuscript of two documents with its inputs; arguments of `article`."""
     for name, table in TABLES.items():
         write_table(table, folder / "tables" / f"{name}.csv")
-    captions_of = {
-        "ladder": r"Steps. Errors of $r \le 6$ modes.", "spring_runs": "Springs.",
-        "bar_runs": "Bars.",
-    }  # fmt: skip
+    captions_of = dict.fromkeys(("spring_runs", "bar_runs"), "Runs.") | {
+        "ladder": r"$r \le 6$ modes."
+    }
     facts = build.Facts(
         captions=captions_of, part=None, full_study="config/default.yaml",
         tables={name: [{"scenes": 2}] for name in FACTS if name != "machine"},
@@ -399,18 +398,10 @@ def test_blocks_about_results_that_the_study_lacks_are_left_out(small):
     shown = {words: words in text for words in ("Shown, ", "Full.", "Left out", "lacking")}
     assert shown == {"Shown, ": True, "Full.": True, "Left out": False, "lacking": False}
     assert "(implementation: numpy, compiled)" in claims
-    found = [
-        words in claims for words in ("Improved method: mixed.", "at least 0.7 in at least 75 %")
-    ]
-    assert found == [True, True]
-
-
-def test_formulas_citations_and_names_of_tables_read_as_text(small):
-    page = (small / "index.html").read_text("utf-8")
-    text = re.sub(r"<annotation.*?</annotation>|<[^>]*>", "", page)
-    assert ["$" in text, "\u202f%" in text] == [False, True]
+    assert "Improved method: mixed." in claims
+    text = re.sub(r"<annotation.*?</annotation>|<[^>]*>", "", text)
+    assert "$" not in text
     assert "A survey is Page (1963); another (pod) (Page 1963)." in text
-    assert '<a href="tables/payoff.html"><code>payoff</code></a>' in page
 
 
 def test_the_article_is_made_with_the_same_bytes_again(small, tmp_path):
@@ -443,9 +434,8 @@ def test_the_page_of_a_table_shows_the_rows_of_a_link_and_the_last_verification(
             keys = [key for key, number in numbers.items() if number["table"] == table]
             with page_at((pages / "tables" / f"{table}.html").as_uri(), 900, 700) as page:
                 page.wait_for_selector("#rows td")
-                rows = page.evaluate(
-                    "keys => keys.map(pdromTable.matching)", [k.partition("|")[2] for k in keys]
-                )
+                filters = [key.partition("|")[2] for key in keys]
+                rows = page.evaluate("keys => keys.map(pdromTable.matching)", filters)
                 for key, found in zip(keys, rows, strict=True):
                     assert set(numbers[key]["rows"]) <= set(found), key
                     assert numbers[key]["take"] or len(found) <= 1, key
