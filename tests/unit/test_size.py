@@ -12,7 +12,7 @@ from places import tracked
 
 LIMITS = {
     "lines of src": 34_140,
-    "lines of tests": 21_215,
+    "lines of tests": 21_240,
     "words of documentation": 18_000,
     "tables": 27,
     "figures": 22,
