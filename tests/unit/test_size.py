@@ -11,7 +11,7 @@ import pytest
 from places import tracked
 
 LIMITS = {
-    "lines of src": 34_140,
+    "lines of src": 34_136,
     "lines of tests": 21_240,
     "words of documentation": 18_000,
     "tables": 27,

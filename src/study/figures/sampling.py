@@ -137,8 +137,7 @@ def deim_entries(drawn: Drawn, **files: list[File]) -> Figure:
     """The $r$ entries that entry-wise DEIM selects lie in nearly $r$ elements. More entries are
     computed than used, since a projection yields all entries of its element. Left: sampled
     elements, coloured by the coordinate of the selected entry. Middle: number of sampled elements,
-    by how many of their entries are used. Right: number of entries that are computed for a basis of
-    size $r$.
+    by how many of their entries are used. Right: entries that are computed for a basis of size $r$.
     """
     scalar = [m for m, reduction in drawn.reductions.items() if reduction.rows == "scalar"]
     read = [

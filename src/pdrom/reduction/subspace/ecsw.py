@@ -294,8 +294,7 @@ def _hash_equations(lifted, differences, buckets, signs, ends, out):
 
 log = logging.getLogger(__name__)
 
-# A unit column counts as dependent on the active columns if its part orthogonal to them is below
-# this.
+# A unit column depends on the active columns if its part orthogonal to them is shorter than this.
 DEPENDENT = 1e-7
 # Columns of G are added at once if their correlation with the residual is at least CLOSE times the
 # largest correlation, at most 1 + BLOCK n at a time if n columns are active already.
