@@ -40,9 +40,9 @@ def local_share(drawn: Drawn, table: pd.DataFrame) -> Figure:
     """In interpreted code the local step takes nearly all the time of a frame. In compiled code its
     share exceeds the 70 % of the preprint's claim C1 (dashed line) only if projections are
     expensive. Each bar is one scene and one of three implementations of the same local step. The
-    printed percentage is the share of the local step, that is of projections (orange) and of the
-    assembly of the right-hand side (light orange); compiled code does both in one pass. Grey is the
-    remaining time, for example for contacts. To the right of each bar is the time per frame.
+    printed percentage is the share of the whole local step: projections (orange) plus assembly of
+    the right-hand side (light orange). Compiled code does both in one pass, drawn in orange. Grey
+    is the remaining time, for example for contacts. To the right of each bar: time per frame.
     """
     scenes = drawn.scenes_of(table)
     present = set(table[table.scene.isin(scenes)].implementation)

@@ -14,8 +14,8 @@ LOW, HIGH = 1e-3, 3.0  # limits of the error axis; errors outside are drawn on t
 PARTS = {
     "span": ("span: best approximation in the subspace", "#5A5A5A", "|"),
     "closure": ("closure: converged reduced step", style.PURPLE, "o"),
-    "sampling": ("sampling: also with sampled elements", "#332288", "s"),
-    "run": ("iterations: also with five iterations only", style.GREEN, ">"),
+    "sampling": ("sampling: in addition, sampled elements", "#332288", "s"),
+    "run": ("iterations: in addition, five iterations", style.GREEN, ">"),
     "full_order": ("full-order model with ten iterations", style.BLACK, "x"),
 }
 ROW = 0.14  # height of a row, inches
@@ -25,12 +25,12 @@ RING = {"markersize": 7.0, "markerfacecolor": "none"}  # the closure, around the
 
 @figure(title="Sources of the error of reduced models", reads={"table": TableOf("error_budget")})
 def error_budget(drawn: Drawn, table: pd.DataFrame) -> Figure:
-    """Restricting the equations to the subspace (Galerkin closure) and stopping after five
-    iterations add most of the error; sampling adds little. Marks: deformation errors of the reduced
-    model (40 POD modes) relative to the converged step, up to the predictability horizon, medians
-    over three test trajectories. Each mark adds one simplification to those before: the subspace,
-    the restricted equations, sampled elements, five iterations. Cross: full-order model. The dashed
-    line is an error of 10 %; errors outside the axis are drawn on its limits.
+    """In most scenes, the largest part of the error comes from restricting the equations to the
+    subspace (Galerkin closure) or from stopping after five iterations. Sampling adds little. Marks:
+    medians, over three test trajectories, of the deformation error of the reduced model (40 POD
+    modes) up to the predictability horizon. The reference is the converged step of the full-order
+    model. Each mark adds one simplification to the mark before it. Cross: full-order model. The
+    dashed line is an error of 10 %; errors outside the axis are drawn on its limits.
     """
     table = table[table.skinning == 0]
     scenes = drawn.scenes_of(table)

@@ -372,7 +372,7 @@ def trajectories(test_trajectories: pd.DataFrame) -> Rows:
 def error_budget(error_budget: pd.DataFrame) -> Rows:
     """Tabulate median deformation errors of test trajectories by part, and the largest part."""
     parts = ["iterations" if part == "run" else part.replace("_", " ") for part in PARTS]
-    yield "lr" + "r" * (len(parts) + 1), ["scene", "columns", *parts, "largest"]
+    yield "lr" + "r" * (len(parts) + 1), ["scene", "modes", *parts, "largest"]
     for (scene, k, skinning), own in error_budget.groupby(["scene", "k", "skinning"], sort=False):
         error = own.deformation_error.fillna(own.error)
         medians = error.groupby(own.part).median().reindex(PARTS)
