@@ -104,11 +104,11 @@ def _draw_decades(ax: Axes, runs: pd.DataFrame) -> None:
 # Ablation step in the table `ladder` -> row label; each step keeps all earlier changes.
 STEPS = {
     "published code": "preprint's code",
-    "+ affine centring": "snapshots less their mean",
+    "+ affine centring": "snapshots minus their mean",
     "+ shared coefficients": "one system for all coordinates",
     "+ whole elements": "element-wise sampling",
     "+ three elements a mode (sound)": "three elements per mode",
-    "and a gain of at most 2": "elements until constant at most 2",
+    "and a gain of at most 2": "more elements: constant at most 2",
 }
 THICK = 2  # number of scenes with thick lines and printed DEIM constants
 
