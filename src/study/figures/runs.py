@@ -45,7 +45,7 @@ RUNS: dict[str, Read] = {
     "reruns": EachOf(RERUNS, "drawn.runs"),
     **FLOORS,
 }
-COMPARED = """the preprint's selection, with separate systems for x, y, z, distorts most simulations or
+COMPARED = """the preprint's selection (separate systems for x, y, z) distorts most simulations or
 makes them blow up. Element-wise DEIM is closer to the full-order model. Pictures show one frame of
 the training trajectory: the full-order model, then reduced simulations with growing basis size $r$.
 Grey outline: full-order model. Red frame: picture at the smaller scale that is given below it.
