@@ -25,7 +25,7 @@ NUMBER = r">{\raggedleft\arraybackslash}p{1.5cm}"  # column whose header may hav
 # Iterator over a table: first (column definitions, header), then the rows; all cells are TeX.
 Rows = Iterator[Any]
 # TeX tables that may break across pages.
-LONG = ("tab_scenes", "tab_trajectories", "tab_claims_in_full", "tab_frontier")
+LONG = ("tab_scenes", "tab_trajectories", "tab_claims_in_full")
 FULL = "full"  # value of column position_basis for runs whose positions are not reduced
 
 

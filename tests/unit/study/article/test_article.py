@@ -55,7 +55,7 @@ section~\ref{sec:more} \cite{Page63}, table \source{payoff}. C1 holds.
 \begin{equation}\label{eq:one} a = \norm{b} \end{equation}
 A survey is \cite{Page63}; another (\method{pod} \cite{Page63}).
 \figureof{ladder}
-\longtableof{\small}{tab:payoff}{Caption.}{tab_frontier.tex}
+\longtableof{\small}{tab:payoff}{Caption.}{tab_scenes.tex}
 \end{document}
 """
 SUPPLEMENT = r"""
@@ -120,7 +120,7 @@ def ranks(payoff: pd.DataFrame) -> Iterator[Any]:
 
 
 INPUTS = (
-    "numbers.json", "tab_frontier.tex", "macros.tex", "figures.tex", "main.bbl", "supplement.bbl",
+    "numbers.json", "tab_scenes.tex", "macros.tex", "figures.tex", "main.bbl", "supplement.bbl",
 )  # fmt: skip
 
 
@@ -209,7 +209,7 @@ def one_table() -> Iterator[None]:
     """Replace the tables of the study by the one table of the manuscripts of these tests."""
     with pytest.MonkeyPatch.context() as patch:
         for module in (build, textables):
-            patch.setattr(module, "TEX_TABLES", {"tab_frontier": ranks})
+            patch.setattr(module, "TEX_TABLES", {"tab_scenes": ranks})
         yield
 
 
