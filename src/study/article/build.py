@@ -116,7 +116,7 @@ def claims_page(
     claims: Mapping[str, ClaimRule], tests: pd.DataFrame, verdicts: pd.DataFrame,
     pages: Mapping[str, str], template: str,
 ) -> str:  # fmt: skip
-    """Return the page of all ``claims`` (name -> rule) with their tests and verdicts.
+    """Return the text of the page of all ``claims`` (name -> rule), their tests and verdicts.
 
     pages : name of a figure -> file name of the page that shows it
     """
@@ -182,6 +182,7 @@ def write_verified(found: Mapping[str, str], folder: Path) -> None:
 FOLDER = Path("src/study/article")
 ASSETS = {
     "text": "article.html",
+    "frame": "plain.html",
     "list": "tables.html",
     "page": "claims.html",
     "table": "table.html",
@@ -229,7 +230,8 @@ def write_article(
     }
     linked = {page: words for page, (words, rule) in LINKS.items() if rule in (*made, "")}
     written = {name: path.read_text("utf-8") for name, path in assets.items()}
-    claimed = written.pop("page").replace("{{LINKS}}", _links(linked))
+    frame = written.pop("frame").replace("{{LINKS}}", _links(linked))
+    claimed = written.pop("page")
     of_table = written.pop("table").replace("{{LINKS}}", _links(linked, "../"))
     rules = load_claims(claims, added)
     for name, content in csv.items():
@@ -238,11 +240,11 @@ def write_article(
         f"<li><a href='tables/{name}.html'><code>{name}</code></a>: {escape(titles()[name])}</li>"
         for name in sorted(csv)
     )
-    written["tables"] = filled(written.pop("list"), {"LINKS": _links(linked), "BODY": items})
+    items = filled(written.pop("list"), {"BODY": items})
+    written["tables"] = filled(frame, {"TITLE": "Tables", "BODY": items})
     if "claims" in outputs:
-        written["claims"] = claims_page(
-            rules, known["claims_tests"], known["claims"], pages, claimed
-        )
+        body = claims_page(rules, known["claims_tests"], known["claims"], pages, claimed)
+        written["claims"] = filled(frame, {"TITLE": "Claims", "BODY": body})
     drawn = _write_figures(figures, pictures, outputs)
     files = {
         f"{name}.tex": linked_table(tex_rows(name, known), {table: known[table] for table in read})

@@ -90,7 +90,7 @@ class _Planned(SourceFileLoader):
 
 
 def import_planned() -> None:
-    """If a run has started this process, import modules as planned from now on."""
+    """Import modules as planned from now on, if a run has started this process."""
     if KEPT in os.environ and _Planned not in sys.meta_path:
         sys.meta_path.insert(0, _Planned)
 

@@ -36,8 +36,7 @@ def equal_error(table: pd.DataFrame) -> Figure:
     time of the reduced model without its training (POD subspace, ECSW, five iterations, two
     training trajectories). Each mesh has three marks, one for each test trajectory; on the left,
     labels give their errors on large meshes. Hollow marks: errors above 10 %. Vertical lines:
-    bootstrap intervals over repeated program runs. *: partly recorded earlier or on another
-    machine.
+    bootstrap intervals over repeated runs. *: partly recorded earlier or on another machine.
     """
     table = table[table.iterations.notna() & (table.stiffness == 1.0)]
     table = held(table.dropna(subset=[f"{name}_speedup" for name in AGAINST]).sort_values(MESH))

@@ -124,8 +124,7 @@ def ladder(drawn: Drawn, table: pd.DataFrame) -> Figure:
     relative to the full-order simulation, up to the predictability horizon. The first row is the
     preprint's code; each further row makes one change and keeps all earlier changes. Thin
     horizontal lines: ranges over simulations with randomly drawn training frames. Numbers on the
-    right: DEIM constants (bounds on the amplification of errors by interpolation) of the scenes
-    with thick lines. Scenes marked (short) end before rounding errors dominate.
+    right: DEIM constants of the scenes with thick lines. Scenes marked (short) have fewer frames.
     """
     table = held(table[table.scene.isin(drawn.scenes) & table.gain.notna()])
     table = held(table[table.direction.isin(["up", "down"])])
